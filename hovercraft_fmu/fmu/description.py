@@ -1,0 +1,150 @@
+"""The table of variables -> modelDescription.xml."""
+
+from xml.etree.ElementTree import Element, SubElement
+
+from .._version import RELEASE_DATE, __version__
+from ..model.integrators import INTEGRATORS
+from .interface import INDEX, UNITS, VARIABLES, Variable
+
+MODEL_NAME = "Hovercraft"
+DESCRIPTION = (
+    "Hovercraft that moves in the plane: a rigid body with one propeller, two bow thrusters, and air drag that acts "
+    "behind the centre of gravity"
+)
+AUTHOR = "The hovercraft-fmu authors"
+LICENSE = "MIT"
+START_TIME, STOP_TIME, COMMUNICATION_STEP = 0.0, 60.0, 0.01
+"""s: the default experiment. It names no tolerance: masters would pass it on to the FMU."""
+CAPABILITIES = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "maxOutputDerivativeOrder": "0",
+    "canRunAsynchronuously": "false",  # sic: the schema spells it so
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+    "providesDirectionalDerivative": "false",
+    # the model is inside and runs in the host's own process, in any Python 3; no tool runs it elsewhere
+    "needsExecutionTool": "false",
+}
+LOG_CATEGORIES = {
+    "logStatusWarning": "What the run survives but its user should know",
+    "logStatusError": "A call that was refused",
+    "logStatusFatal": "A call that was refused, as pythonfmu's wrapper reports it: the instance must be freed",
+    "logAll": "Everything",
+}
+
+
+def model_description(build: str) -> Element:
+    """The description of the FMU whose content has the hexadecimal digest `build`, as an XML tree."""
+    root = Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "2.0",
+            "modelName": MODEL_NAME,
+            "guid": guid(build),
+            "description": DESCRIPTION,
+            "author": AUTHOR,
+            "version": __version__,
+            "copyright": f"Copyright (c) {RELEASE_DATE[:4]} {AUTHOR}",
+            "license": LICENSE,
+            "generationTool": f"hovercraft-fmu {__version__} with PythonFMU",
+            "generationDateAndTime": RELEASE_DATE,
+            "variableNamingConvention": "structured",
+        },
+    )
+    SubElement(root, "CoSimulation", {"modelIdentifier": MODEL_NAME, **CAPABILITIES})
+    _units(SubElement(root, "UnitDefinitions"))
+    _types(SubElement(root, "TypeDefinitions"))
+    categories = SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        SubElement(categories, "Category", {"name": name, "description": text})
+    SubElement(
+        root,
+        "DefaultExperiment",
+        {"startTime": repr(START_TIME), "stopTime": repr(STOP_TIME), "stepSize": repr(COMMUNICATION_STEP)},
+    )
+    variables = SubElement(root, "ModelVariables")
+    for variable in VARIABLES:
+        _variable(variables, variable)
+    _structure(SubElement(root, "ModelStructure"))
+    return root
+
+
+def guid(build: str) -> str:
+    """A digest in the shape of a GUID."""
+    return f"{{{build[:8]}-{build[8:12]}-{build[12:16]}-{build[16:20]}-{build[20:32]}}}"
+
+
+def _units(parent: Element) -> None:
+    for name, unit in UNITS.items():
+        node = SubElement(parent, "Unit", {"name": name})
+        SubElement(node, "BaseUnit", {base: str(exponent) for base, exponent in unit.base.items()})
+        if unit.display:
+            display, factor = unit.display
+            SubElement(node, "DisplayUnit", {"name": display, "factor": repr(factor)})
+
+
+def _types(parent: Element) -> None:
+    for name, unit in UNITS.items():
+        node = SubElement(parent, "SimpleType", {"name": unit.type_name, "description": f"{unit.quantity} in {name}"})
+        real = SubElement(node, "Real", {"quantity": unit.quantity, "unit": name})
+        if unit.display:
+            real.set("displayUnit", unit.display[0])
+    node = SubElement(parent, "SimpleType", {"name": "Integrator", "description": "Numerical method of a sub-step"})
+    enumeration = SubElement(node, "Enumeration", {"quantity": "Integrator"})
+    for number, method in enumerate(INTEGRATORS, 1):
+        SubElement(
+            enumeration, "Item", {"name": method.name, "value": str(number), "description": method.description}
+        )
+
+
+def _variable(parent: Element, variable: Variable) -> None:
+    attributes = {
+        "name": variable.name,
+        "valueReference": str(variable.reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+    }
+    if variable.initial:
+        attributes["initial"] = variable.initial
+    _typed(SubElement(parent, "ScalarVariable", attributes), variable)
+
+
+def _typed(parent: Element, variable: Variable) -> None:
+    node = SubElement(parent, variable.kind)
+    if variable.kind == "Enumeration":
+        node.set("declaredType", "Integrator")
+    if variable.unit:
+        unit = UNITS[variable.unit]
+        node.set("declaredType", unit.type_name)
+        node.set("quantity", unit.quantity)
+        node.set("unit", variable.unit)
+        if unit.display:
+            node.set("displayUnit", unit.display[0])
+    numbers = {"min": variable.minimum, "max": variable.maximum, "nominal": variable.nominal, "start": variable.start}
+    for name, value in numbers.items():
+        if value is not None:
+            node.set(name, repr(value))  # repr: the shortest text that gives the same bits
+    if variable.derivative_of:
+        node.set("derivative", str(INDEX[variable.derivative_of]))
+
+
+def _structure(parent: Element) -> None:
+    # An output belongs to a communication point: it never follows the inputs of that point, so no dependencies.
+    # Without saying so, masters see algebraic loops that are not there.
+    outputs = SubElement(parent, "Outputs")
+    for variable in VARIABLES:
+        if variable.causality == "output":
+            SubElement(outputs, "Unknown", {"index": str(INDEX[variable.name]), "dependencies": ""})
+    unknowns = SubElement(parent, "InitialUnknowns")
+    for variable in VARIABLES:
+        if variable.initial == "calculated" and variable.causality in ("output", "calculatedParameter"):
+            indices = sorted(INDEX[name] for name in variable.depends_on)
+            SubElement(
+                unknowns,
+                "Unknown",
+                {"index": str(INDEX[variable.name]), "dependencies": " ".join(map(str, indices))},
+            )

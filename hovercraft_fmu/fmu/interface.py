@@ -1,0 +1,186 @@
+"""THE table of variables. The XML, the slave, the documentation and the checks of names are made from it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import sqrt
+from types import MappingProxyType
+from typing import Literal, TypeAlias
+
+from ..model.craft import Craft
+from ..model.dynamics import Controls, State, body_velocity, loads, saturate, steering
+from ..model.integrators import INTEGRATORS
+
+Kind: TypeAlias = Literal["Real", "Integer", "Enumeration"]
+Causality: TypeAlias = Literal["input", "output", "local", "parameter", "calculatedParameter"]
+Variability: TypeAlias = Literal["continuous", "discrete", "fixed", "tunable"]
+
+SUBSTEPS_MAX = 2147483647
+"""The largest FMI Integer: the counter of sub-steps stops there."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as FMI wants it: exponents of the SI base units, and what displays show instead."""
+
+    type_name: str
+    quantity: str
+    base: Mapping[str, int]
+    display: tuple[str, float] | None = None
+    """Name and factor: display value = factor * value."""
+
+
+DEGREES_PER_RADIAN = 57.29577951308232
+
+UNITS: Mapping[str, Unit] = MappingProxyType(
+    {
+        "1": Unit("Ratio", "Dimensionless", {}),
+        "kg": Unit("Mass", "Mass", {"kg": 1}),
+        "kg.m2": Unit("MomentOfInertia", "MomentOfInertia", {"kg": 1, "m": 2}),
+        "kg/m3": Unit("Density", "Density", {"kg": 1, "m": -3}),
+        "m": Unit("Length", "Length", {"m": 1}),
+        "m/s": Unit("Velocity", "Velocity", {"m": 1, "s": -1}),
+        "m/s2": Unit("Acceleration", "Acceleration", {"m": 1, "s": -2}),
+        "m2": Unit("Area", "Area", {"m": 2}),
+        "N": Unit("Force", "Force", {"kg": 1, "m": 1, "s": -2}),
+        "N.m": Unit("Moment", "Torque", {"kg": 1, "m": 2, "s": -2}),
+        "rad": Unit("Angle", "Angle", {"rad": 1}, ("deg", DEGREES_PER_RADIAN)),
+        "rad/s": Unit("AngularVelocity", "AngularVelocity", {"rad": 1, "s": -1}, ("deg/s", DEGREES_PER_RADIAN)),
+        "rad/s2": Unit("AngularAcceleration", "AngularAcceleration", {"rad": 1, "s": -2}),
+        "s": Unit("Time", "Time", {"s": 1}),
+    }
+)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A row of the table. Names and value references stay as they are within a major version."""
+
+    reference: int
+    name: str
+    causality: Causality
+    variability: Variability
+    unit: str | None
+    start: float | int | None
+    description: str
+    kind: Kind = "Real"
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    derivative_of: str | None = None
+    depends_on: tuple[str, ...] = ()
+    """For a calculated output or parameter: the start values that its own start follows from."""
+
+    @property
+    def initial(self) -> str | None:
+        """FMI's `initial`: exact where a start is given, else calculated; none for an input."""
+        if self.causality == "input":
+            return None
+        return "calculated" if self.start is None else "exact"
+
+
+_CRAFT = Craft()
+
+VARIABLES: tuple[Variable, ...] = (
+    # -- inputs
+    Variable(0, "thrust", "input", "continuous", "N", 5.0,
+             "Thrust of the propeller, forward; held inside thrust_min ... thrust_max"),
+    Variable(1, "port_thruster", "input", "continuous", "1", 0.0,
+             "Port bow thruster, 0 (off) to 1 (full), held inside; pushes the bow to starboard",
+             minimum=0.0, maximum=1.0),
+    Variable(2, "starboard_thruster", "input", "continuous", "1", 0.0,
+             "Starboard bow thruster, 0 (off) to 1 (full), held inside; pushes the bow to port",
+             minimum=0.0, maximum=1.0),
+    # -- the state
+    Variable(3, "pose.x", "output", "continuous", "m", 0.0,
+             "Position of the centre of gravity, to the right", nominal=10.0),
+    Variable(4, "pose.y", "output", "continuous", "m", 0.0,
+             "Position of the centre of gravity, down the screen", nominal=10.0),
+    Variable(5, "pose.heading", "output", "continuous", "rad", 0.0,
+             "Heading: 0 along +x, grows toward +y (a turn to starboard); counts whole turns", nominal=1.0),
+    Variable(6, "velocity.x", "output", "continuous", "m/s", 0.0,
+             "Velocity of the centre of gravity, world frame", nominal=0.1, derivative_of="pose.x"),
+    Variable(7, "velocity.y", "output", "continuous", "m/s", 0.0,
+             "Velocity of the centre of gravity, world frame", nominal=0.1, derivative_of="pose.y"),
+    Variable(8, "velocity.yaw_rate", "output", "continuous", "rad/s", 0.0,
+             "Yaw rate, positive to starboard", nominal=0.1, derivative_of="pose.heading"),
+    # -- calculated from the state, the inputs of the step that led to it, and the parameters
+    Variable(9, "body.surge", "output", "continuous", "m/s", None,
+             "Velocity of the centre of gravity, forward", nominal=0.1,
+             depends_on=("pose.heading", "velocity.x", "velocity.y")),
+    Variable(10, "body.sway", "output", "continuous", "m/s", None,
+             "Velocity of the centre of gravity, to starboard", nominal=0.1,
+             depends_on=("pose.heading", "velocity.x", "velocity.y")),
+    Variable(11, "speed", "output", "continuous", "m/s", None,
+             "Speed over ground of the centre of gravity", minimum=0.0, nominal=0.1,
+             depends_on=("velocity.x", "velocity.y")),
+    Variable(12, "force.x", "local", "continuous", "N", None, "Total force on the craft, world frame"),
+    Variable(13, "force.y", "local", "continuous", "N", None, "Total force on the craft, world frame"),
+    Variable(14, "moment", "local", "continuous", "N.m", None,
+             "Total moment about the centre of gravity, positive to starboard"),
+    Variable(15, "acceleration.x", "local", "continuous", "m/s2", None,
+             "Acceleration of the centre of gravity, world frame", derivative_of="velocity.x"),
+    Variable(16, "acceleration.y", "local", "continuous", "m/s2", None,
+             "Acceleration of the centre of gravity, world frame", derivative_of="velocity.y"),
+    Variable(17, "acceleration.yaw", "local", "continuous", "rad/s2", None,
+             "Yaw acceleration", derivative_of="velocity.yaw_rate"),
+    Variable(18, "applied.thrust", "local", "continuous", "N", None, "Thrust after saturation"),
+    Variable(19, "applied.steering", "local", "continuous", "N", None,
+             "Side force of both bow thrusters after saturation, to starboard"),
+    Variable(20, "substeps", "local", "discrete", None, None,
+             f"Sub-steps since initialization; stops at {SUBSTEPS_MAX}",
+             kind="Integer", minimum=0, maximum=SUBSTEPS_MAX),
+    # -- parameters
+    Variable(21, "mass", "parameter", "fixed", "kg", _CRAFT.mass, "Mass, greater than 0", minimum=0.0),
+    Variable(22, "inertia", "parameter", "fixed", "kg.m2", _CRAFT.inertia,
+             "Moment of inertia about the vertical through the centre of gravity, greater than 0", minimum=0.0),
+    Variable(23, "length", "parameter", "fixed", "m", _CRAFT.length,
+             "Length of the bounding box, greater than 0", minimum=0.0),
+    Variable(24, "width", "parameter", "fixed", "m", _CRAFT.width,
+             "Width of the bounding box, greater than 0", minimum=0.0),
+    Variable(25, "height", "parameter", "fixed", "m", _CRAFT.height,
+             "Height of the bounding box, greater than 0", minimum=0.0),
+    Variable(26, "drag_coefficient", "parameter", "tunable", "1", _CRAFT.drag_coefficient,
+             "Air drag coefficient of the projected area", minimum=0.0),
+    Variable(27, "air_density", "parameter", "tunable", "kg/m3", _CRAFT.air_density,
+             "Density of the air; the start is the sea-level value of the ICAO standard atmosphere", minimum=0.0),
+    Variable(28, "drag_center_fraction", "parameter", "fixed", "1", _CRAFT.drag_center_fraction,
+             "Centre of drag ahead of the centre of gravity, as a fraction of the length; negative: behind it",
+             minimum=-0.5, maximum=0.5),
+    Variable(29, "projected_area", "calculatedParameter", "fixed", "m2", None,
+             "Area that the drag coefficient refers to: (length + width) / 2 * height",
+             depends_on=("length", "width", "height")),
+    Variable(30, "steering_force", "parameter", "tunable", "N", _CRAFT.steering_force,
+             "Side force of one bow thruster, full on", minimum=0.0),
+    Variable(31, "thrust_min", "parameter", "tunable", "N", _CRAFT.thrust_min,
+             "Lower limit of the thrust; negative allows reverse thrust"),
+    Variable(32, "thrust_max", "parameter", "tunable", "N", _CRAFT.thrust_max,
+             "Upper limit of the thrust, not below thrust_min"),
+    Variable(33, "step_size", "parameter", "fixed", "s", 0.001,
+             "The sub-step: a communication step is cut into steps of this size, greater than 0",
+             minimum=0.0, nominal=0.001),
+    Variable(34, "integrator", "parameter", "fixed", None, 1,
+             "The method that carries the state over a sub-step", kind="Enumeration",
+             minimum=1, maximum=len(INTEGRATORS)),
+)  # fmt: skip
+
+BY_NAME: Mapping[str, Variable] = MappingProxyType({variable.name: variable for variable in VARIABLES})
+INDEX: Mapping[str, int] = MappingProxyType({variable.name: i for i, variable in enumerate(VARIABLES, 1)})
+"""Place in ModelVariables, counted from 1: what the model structure refers to."""
+
+INPUTS = ("thrust", "port_thruster", "starboard_thruster")
+"""In the order of Controls."""
+STATES = ("pose.x", "pose.y", "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
+"""In the order of State."""
+CRAFT_PARAMETERS = tuple(v.name for v in VARIABLES if v.name in Craft.__dataclass_fields__)
+CALCULATED = tuple(v.name for v in VARIABLES if v.start is None and v.variability == "continuous")
+"""In the order of `observe`."""
+
+
+def observe(state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
+    """The calculated variables at a state, with the controls of the step that led to it; order of CALCULATED."""
+    surge, sway = body_velocity(state)
+    speed = sqrt(state.vx * state.vx + state.vy * state.vy)
+    force_x, force_y, moment = loads(state, controls, craft)
+    acceleration = (force_x / craft.mass, force_y / craft.mass, moment / craft.inertia)
+    applied = (saturate(controls, craft).thrust, steering(controls, craft))
+    return (surge, sway, speed, force_x, force_y, moment, *acceleration, *applied)

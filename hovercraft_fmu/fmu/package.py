@@ -1,0 +1,154 @@
+"""Builds the FMU archive; two builds of one tree give the same bytes."""
+
+import hashlib
+import io
+import os
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+
+import pythonfmu
+from pythonfmu.builder import FmuBuilder
+
+from ..view.icon import icon_png
+from .description import MODEL_NAME
+from .document import index_html
+
+PACKAGE = Path(__file__).parent.parent
+TRAVELS = ("_version.py", "model/*.py", "fmu/__init__.py", "fmu/interface.py", "fmu/description.py", "fmu/slave.py")
+"""What of this package goes into the FMU, as patterns."""
+STATIC = Path(__file__).parent / "documentation"
+ENTRY_SCRIPT = '''\
+"""The entry of the FMU. Its name carries a digest of the content, so no other module can be taken for it."""
+
+from typing import Any
+
+from {package}.fmu.slave import HovercraftSlave
+
+
+class {model}(HovercraftSlave):
+    """The slave of this very build."""
+
+    build = "{build}"
+
+    # pythonfmu's wrapper needs a class with a method of its own
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+'''
+
+
+def build_fmu(path: str | os.PathLike[str] = f"build/{MODEL_NAME}.fmu") -> Path:
+    """Write the FMU to `path` (its folder is made) and return the path.
+
+    Raises:
+        ValueError: the name does not end in .fmu.
+        OSError: the file cannot be written; one that stood there before still does.
+    """
+    path = Path(path)
+    if path.suffix != ".fmu":
+        raise ValueError(f"path = {str(path)!r}: must end in .fmu")
+    content = _archive()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        unfinished.write_bytes(content)
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path
+
+
+def _archive() -> bytes:
+    sources = {f"{name.relative_to(PACKAGE).as_posix()}": name.read_bytes() for name in _traveling()}
+    documents = _documents()
+    icon = icon_png()
+    build = _digest({**sources, **documents, "model.png": icon, **_pythonfmu_files()})
+    package = f"hovercraft_{build[:16]}"
+    with tempfile.TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
+        work = Path(folder)
+        _write(work / package, {"__init__.py": b'"""The hovercraft model of one FMU."""\n', **sources})
+        _write(work / "documentation", documents)
+        script = work / f"{package}_fmu.py"
+        script.write_text(
+            ENTRY_SCRIPT.format(package=package, model=MODEL_NAME, build=build), encoding="utf-8", newline="\n"
+        )
+        with _imports_undone():
+            fmu = FmuBuilder.build_FMU(
+                script,
+                dest=work / f"{MODEL_NAME}.fmu",
+                project_files=[work / package],
+                documentation_folder=work / "documentation",
+            )
+        return _repacked(fmu, icon)
+
+
+def _traveling() -> list[Path]:
+    return sorted(path for pattern in TRAVELS for path in PACKAGE.glob(pattern))
+
+
+def _documents() -> dict[str, bytes]:
+    static = {
+        path.relative_to(STATIC).as_posix(): path.read_bytes()
+        for path in sorted(STATIC.rglob("*"))
+        if path.is_file() and path.suffix != ".jinja"
+    }
+    return {**static, "index.html": index_html().encode(), "licenses/pythonfmu.txt": _pythonfmu_license()}
+
+
+def _pythonfmu_license() -> bytes:
+    files = metadata.files("pythonfmu") or []
+    return next(file for file in files if file.name.upper().startswith("LICENSE")).read_binary()
+
+
+def _pythonfmu_files() -> dict[str, bytes]:
+    """What the builder puts in from pythonfmu: its modules and its binaries."""
+    home = Path(pythonfmu.__file__).parent
+    paths = [*home.glob("*.py"), *(path for path in (home / "resources").rglob("*") if path.is_file())]
+    return {f"pythonfmu/{path.relative_to(home).as_posix()}": path.read_bytes() for path in paths}
+
+
+def _digest(files: Mapping[str, bytes]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(f"{name}\0{len(files[name])}\0".encode() + files[name])
+    return digest.hexdigest()[:32]
+
+
+def _write(folder: Path, files: Mapping[str, bytes]) -> None:
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+
+
+@contextmanager
+def _imports_undone() -> Iterator[None]:
+    """The builder imports the slave and leaves it, and a folder in sys.path, behind; here nothing stays."""
+    path, modules = list(sys.path), set(sys.modules)
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        for name in set(sys.modules) - modules:
+            if name.startswith("hovercraft_"):
+                del sys.modules[name]
+
+
+def _repacked(fmu: Path, icon: bytes) -> bytes:
+    """The archive in sorted order, without the times and permissions of the files it was made from."""
+    with zipfile.ZipFile(fmu) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    files["model.png"] = icon
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name in sorted(files):
+            info = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.create_system = 3  # Unix, wherever it was built
+            info.external_attr = 0o644 << 16
+            archive.writestr(info, files[name])
+    return buffer.getvalue()

@@ -1,0 +1,341 @@
+"""The PythonFMU slave: life cycle, variables, state. It trusts nothing that comes from the host, and checks it once."""
+
+import ctypes
+import functools
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from enum import Enum
+from typing import Any, ClassVar, Concatenate, NoReturn, ParamSpec, TypeVar
+from xml.etree.ElementTree import Element
+
+from pythonfmu.fmi2slave import Fmi2Slave
+
+from ..model.craft import Craft, check_parameter
+from ..model.dynamics import Controls, State
+from ..model.integrators import integrator
+from ..model.subcycling import NonFiniteState, Settings, advance, check_step_size
+from .description import model_description
+from .interface import (
+    BY_NAME,
+    CALCULATED,
+    CRAFT_PARAMETERS,
+    INPUTS,
+    STATES,
+    SUBSTEPS_MAX,
+    VARIABLES,
+    Variable,
+    observe,
+)
+
+SAME_TIME = 1e-9
+"""Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step."""
+
+BY_REFERENCE = {variable.reference: variable for variable in VARIABLES}
+REALS = frozenset(v.reference for v in VARIABLES if v.kind == "Real")
+INTEGERS = frozenset(v.reference for v in VARIABLES if v.kind != "Real")
+THRUST, PORT, STARBOARD = (BY_NAME[name].reference for name in INPUTS)
+OBSERVED = tuple(BY_NAME[name].reference for name in STATES + CALCULATED)
+OBSERVED_SET = frozenset(OBSERVED) | {BY_NAME["projected_area"].reference}
+STEP_SIZE = BY_NAME["step_size"].reference
+INTEGRATOR = BY_NAME["integrator"].reference
+SUBSTEPS = BY_NAME["substeps"].reference
+PROJECTED_AREA = BY_NAME["projected_area"].reference
+STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
+KEPT_REALS = tuple(
+    v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES
+)
+"""What a host sets and the slave keeps as it was set: inputs and parameters."""
+DIGEST_SIZE = 64
+"""Bytes of the hexadecimal SHA-256 ahead of a serialized state."""
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Phase(Enum):
+    """Where the instance is in FMI's life cycle, in the words of the standard."""
+
+    INSTANTIATED = "instantiated"
+    INITIALIZING = "initialization mode"
+    STEPPING = "step mode"
+    TERMINATED = "terminated"
+
+
+SETTABLE = {
+    Phase.INSTANTIATED: frozenset(v.reference for v in VARIABLES if v.start is not None),
+    Phase.INITIALIZING: frozenset(v.reference for v in VARIABLES if v.start is not None),
+    Phase.STEPPING: frozenset(v.reference for v in VARIABLES if v.causality == "input" or v.variability == "tunable"),
+    Phase.TERMINATED: frozenset[int](),
+}
+
+
+def called_by_wrapper(
+    method: Callable[Concatenate["HovercraftSlave", P], R],
+) -> Callable[Concatenate["HovercraftSlave", P], R]:
+    """A method that pythonfmu's wrapper calls; an exception leaves it in a shape that the wrapper survives.
+
+    On every exception the wrapper gives up its references to the class, the instance and the log queue, and again
+    when the instance is freed. One reference more to each of them balances that. And a message that is still queued
+    would turn the text of the exception into 'unknown error'.
+    """
+
+    @functools.wraps(method)
+    def call(self: "HovercraftSlave", *args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return method(self, *args, **kwargs)
+        except Exception:
+            self.log_queue.clear()
+            for kept in (type(self), self, self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            raise
+
+    return call
+
+
+class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no types
+    """The hovercraft behind the FMI functions of pythonfmu's wrapper.
+
+    Variables are not registered with pythonfmu: its way of reading and writing them costs more than a sub-step, and
+    knows neither Enumerations nor the state between two communication points.
+    """
+
+    build: ClassVar[str] = ""
+    """A digest of all that is in the FMU; the entry script of an FMU sets it."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._phase = Phase.INSTANTIATED
+        self._reals: dict[int, float] = {v.reference: float(v.start or 0.0) for v in VARIABLES if v.kind == "Real"}
+        self._integers: dict[int, int] = {v.reference: int(v.start or 0) for v in VARIABLES if v.kind != "Real"}
+        self._time = 0.0
+        self._state = State()
+        # with these the last step was made, and from these the outputs are calculated
+        self._controls = Controls()
+        self._craft = Craft()
+        self._settings = Settings()
+        # set since then, to be taken up: parameters by the next step, everything by the next get
+        self._tuned = False
+        self._stale = True
+
+    # ---- life cycle
+
+    @called_by_wrapper
+    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+        self._require("fmi2SetupExperiment", Phase.INSTANTIATED)
+        if not math.isfinite(start_time):
+            raise ValueError(f"startTime = {start_time!r} s: must be a finite number")
+        self._time = start_time
+
+    @called_by_wrapper
+    def enter_initialization_mode(self) -> None:
+        self._require("fmi2EnterInitializationMode", Phase.INSTANTIATED)
+        self._phase = Phase.INITIALIZING
+
+    @called_by_wrapper
+    def exit_initialization_mode(self) -> None:
+        self._require("fmi2ExitInitializationMode", Phase.INITIALIZING)
+        self._take_up_start_values()
+        self._phase = Phase.STEPPING
+
+    @called_by_wrapper
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        self._require("fmi2DoStep", Phase.STEPPING)
+        if not (math.isfinite(step_size) and step_size > 0.0):
+            raise ValueError(
+                f"communicationStepSize = {step_size!r} s: must be a finite number greater than 0"
+            )
+        if not abs(current_time - self._time) <= SAME_TIME * max(1.0, abs(self._time)):
+            raise ValueError(
+                f"currentCommunicationPoint = {current_time!r} s: must be where the last step ended, {self._time!r} s"
+            )
+        reals = self._reals
+        controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD])
+        craft = self._make_craft() if self._tuned else self._craft
+        try:
+            state, n = advance(self._state, controls, craft, step_size, self._settings)
+        except NonFiniteState as error:
+            self._refuse_motion(error)
+        self._state, self._controls, self._craft, self._tuned = state, controls, craft, False
+        self._time = current_time + step_size
+        self._integers[SUBSTEPS] = min(self._integers[SUBSTEPS] + n, SUBSTEPS_MAX)
+        self._stale = True
+        return True
+
+    @called_by_wrapper
+    def terminate(self) -> None:
+        self._require("fmi2Terminate", Phase.STEPPING)
+        self._phase = Phase.TERMINATED
+
+    def _require(self, call: str, phase: Phase) -> None:
+        if self._phase is not phase:
+            raise RuntimeError(f"{call} in state '{self._phase.value}': must be called in state '{phase.value}'")
+
+    def _refuse_motion(self, error: NonFiniteState) -> NoReturn:
+        name = STATES[State._fields.index(error.component)]
+        raise ValueError(
+            f"{name} = {error.value!r} after {self._time!r} s: must stay a finite number; the step was refused and "
+            f"the state of {self._time!r} s stands; the motion is too fast for sub-steps of {error.substep!r} s: "
+            "set a smaller step_size"
+        ) from error
+
+    # ---- variables
+
+    @called_by_wrapper
+    def get_real(self, vrs: list[int]) -> list[float]:
+        if self._stale and not OBSERVED_SET.isdisjoint(vrs):
+            self._calculate()
+        reals = self._reals
+        try:
+            return [reals[reference] for reference in vrs]
+        except KeyError as error:
+            raise _unknown("Real", error.args[0]) from None
+
+    @called_by_wrapper
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        integers = self._integers
+        try:
+            return [integers[reference] for reference in vrs]
+        except KeyError as error:
+            raise _unknown("Integer or Enumeration", error.args[0]) from None
+
+    @called_by_wrapper
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        raise _unknown("Boolean", vrs[0])
+
+    @called_by_wrapper
+    def get_string(self, vrs: list[int]) -> list[str]:
+        raise _unknown("String", vrs[0])
+
+    @called_by_wrapper
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        # all are checked before one is set: a refused call changes nothing
+        settable = SETTABLE[self._phase]
+        for reference, value in zip(vrs, values, strict=True):
+            if reference not in REALS:
+                raise _unknown("Real", reference)
+            if reference > STARBOARD or reference not in settable or not math.isfinite(value):
+                self._check_set(BY_REFERENCE[reference], value)  # inputs come often and have no other rule
+        self._reals.update(zip(vrs, values, strict=True))
+        self._after_set(vrs)
+
+    @called_by_wrapper
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        for reference, value in zip(vrs, values, strict=True):
+            if reference not in INTEGERS:
+                raise _unknown("Integer or Enumeration", reference)
+            self._check_set(BY_REFERENCE[reference], value)
+        self._integers.update(zip(vrs, values, strict=True))
+        self._after_set(vrs)
+
+    @called_by_wrapper
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        raise _unknown("Boolean", vrs[0])
+
+    @called_by_wrapper
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        raise _unknown("String", vrs[0])
+
+    def _check_set(self, variable: Variable, value: float) -> None:
+        if variable.reference not in SETTABLE[self._phase]:
+            raise ValueError(
+                f"{variable.name} = {value!r}: must not be set in state '{self._phase.value}' "
+                f"({variable.variability} {variable.causality})"
+            )
+        if not math.isfinite(value):
+            raise ValueError(f"{variable.name} = {value!r}: must be a finite number")
+        if variable.name in CRAFT_PARAMETERS:
+            check_parameter(variable.name, value)
+        elif variable.reference == STEP_SIZE:
+            check_step_size(value)
+        elif variable.reference == INTEGRATOR:
+            integrator(int(value))
+
+    def _after_set(self, vrs: list[int]) -> None:
+        if self._phase is Phase.STEPPING:
+            # what is read belongs to the communication point: it changes with the next step, not now
+            self._tuned = self._tuned or max(vrs, default=0) > STARBOARD
+        else:
+            self._stale = True
+
+    def _make_craft(self) -> Craft:
+        return Craft(**{name: self._reals[BY_NAME[name].reference] for name in CRAFT_PARAMETERS})
+
+    def _take_up_start_values(self) -> None:
+        reals = self._reals
+        self._craft = self._make_craft()
+        self._settings = Settings(reals[STEP_SIZE], integrator(self._integers[INTEGRATOR]))
+        self._controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD])
+        self._state = State(*(reals[BY_NAME[name].reference] for name in STATES))
+        reals[PROJECTED_AREA] = self._craft.projected_area
+        self._tuned = False
+        self._stale = True
+
+    def _calculate(self) -> None:
+        if self._phase in (Phase.INSTANTIATED, Phase.INITIALIZING):
+            self._take_up_start_values()
+        state, controls, craft = self._state, self._controls, self._craft
+        self._reals.update(zip(OBSERVED, (*state, *observe(state, controls, craft)), strict=True))
+        self._stale = False
+
+    # ---- FMU state
+
+    @called_by_wrapper
+    def _get_fmu_state(self) -> dict[str, Any]:
+        return {
+            "build": self.build,
+            "phase": self._phase.name,
+            "time": self._time,
+            "reals": [self._reals[reference] for reference in KEPT_REALS],
+            "integers": [self._integers[reference] for reference in sorted(INTEGERS)],
+            "state": list(self._state if self._started() else (self._reals[r] for r in STATE_REFERENCES)),
+            "controls": list(self._controls),
+            "craft": [getattr(self._craft, name) for name in CRAFT_PARAMETERS],
+            "tuned": self._tuned,
+        }
+
+    @called_by_wrapper
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        if state["build"] != self.build:
+            raise ValueError(
+                f"FMU state of build {state['build']!r}: must be a state of this build, {self.build!r}"
+            )
+        self._phase = Phase[state["phase"]]
+        self._time = state["time"]
+        self._reals.update(zip(KEPT_REALS, state["reals"], strict=True))
+        self._integers.update(zip(sorted(INTEGERS), state["integers"], strict=True))
+        self._state = State(*state["state"])
+        self._reals.update(zip(STATE_REFERENCES, self._state, strict=True))
+        self._controls = Controls(*state["controls"])
+        self._craft = Craft(**dict(zip(CRAFT_PARAMETERS, state["craft"], strict=True)))
+        self._reals[PROJECTED_AREA] = self._craft.projected_area
+        self._settings = Settings(self._reals[STEP_SIZE], integrator(self._integers[INTEGRATOR]))
+        self._tuned = state["tuned"]
+        self._stale = True
+
+    def _started(self) -> bool:
+        return self._phase in (Phase.STEPPING, Phase.TERMINATED)
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        text = json.dumps(state).encode()
+        return hashlib.sha256(text).hexdigest().encode() + text
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        digest, text = state[:DIGEST_SIZE], state[DIGEST_SIZE:]
+        if hashlib.sha256(text).hexdigest().encode() != digest:
+            raise ValueError(f"serialized FMU state of {len(state)} bytes: must be complete and unchanged")
+        restored: dict[str, Any] = json.loads(text)
+        return restored
+
+    # ---- description
+
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
+        """The model description, made from the table of variables."""
+        return model_description(self.build)
+
+
+def _unknown(kind: str, reference: int) -> ValueError:
+    return ValueError(f"value reference {reference}: must be that of a variable of type {kind}")

@@ -1,0 +1,108 @@
+"""A communication step is cut into sub-steps."""
+
+import math
+from typing import NamedTuple
+
+from .craft import Craft
+from .dynamics import Controls, Namespace, State
+from .integrators import INTEGRATORS, Integrator
+
+MAX_SUBSTEPS = 10**9
+"""Of one communication step: half an hour of computing, or a slip of the decimal point."""
+WHOLE = 1e-9
+"""Relative: a communication step this close to a whole number of sub-steps is that number of sub-steps."""
+
+
+class Settings(NamedTuple):
+    """How the time is cut and the state carried over it."""
+
+    step_size: float = 0.001
+    """s, the sub-step"""
+    integrator: Integrator = INTEGRATORS[0]
+
+
+class NonFiniteState(ArithmeticError):
+    """A step that led to NaN or infinity; the state before it still stands."""
+
+    def __init__(self, component: str, value: float, substep: float) -> None:
+        self.component = component
+        self.value = value
+        self.substep = substep
+        super().__init__(
+            f"{component} = {value!r} after sub-steps of {substep!r} s: must stay a finite number; "
+            "the motion is too fast for this sub-step: set a smaller step_size"
+        )
+
+
+def check_step_size(step_size: float) -> None:
+    """Raises ValueError unless the sub-step is a positive finite number."""
+    if not (math.isfinite(step_size) and step_size > 0.0):
+        raise ValueError(f"step_size = {step_size!r} s: must be a finite number greater than 0")
+
+
+def substeps(communication_step: float, step_size: float) -> tuple[int, float]:
+    """Number and size [s] of the sub-steps that make up a communication step [s].
+
+    Hosts add up time in floating point and pass 0.009999999999999787 for 0.01. Where the communication step is that
+    close to a whole number of sub-steps, the sub-step is `step_size` itself, and the bits do not depend on how the
+    host cuts the time. Elsewhere n equal sub-steps, none longer than `step_size`, end exactly on time.
+
+    Raises:
+        ValueError: a step that is negative or not finite, or would need more than 10^9 sub-steps.
+    """
+    if not (math.isfinite(communication_step) and communication_step >= 0.0):
+        raise ValueError(f"communication step = {communication_step!r} s: must be a finite number, not negative")
+    check_step_size(step_size)
+    ratio = communication_step / step_size
+    if ratio > MAX_SUBSTEPS + 1:
+        raise _too_many(communication_step, step_size)
+    whole = max(1, round(ratio))
+    if abs(whole * step_size - communication_step) <= WHOLE * communication_step:
+        n, h = whole, step_size
+    else:
+        n = max(1, math.ceil(ratio))
+        h = communication_step / n
+    if n > MAX_SUBSTEPS:
+        raise _too_many(communication_step, step_size)
+    return n, h
+
+
+def _too_many(communication_step: float, step_size: float) -> ValueError:
+    return ValueError(
+        f"communication step = {communication_step!r} s: must not need more than 10^9 sub-steps of "
+        f"step_size = {step_size!r} s"
+    )
+
+
+def advance(
+    state: State,
+    controls: Controls,
+    craft: Craft,
+    communication_step: float,
+    settings: Settings = Settings(),  # noqa: B008 - immutable
+    ns: Namespace = math,
+) -> tuple[State, int]:
+    """The state one communication step [s] later, with the controls held, and the number of sub-steps it took.
+
+    A step of 0 changes no bit.
+
+    Raises:
+        ValueError: see `substeps`.
+        NonFiniteState: the motion left the range of numbers (plain floats only; arrays of craft are not searched).
+    """
+    if communication_step == 0.0:
+        return state, 0
+    n, h = substeps(communication_step, settings.step_size)
+    try:
+        new = settings.integrator.integrate(state, controls, craft, h, n, ns)
+    except (ValueError, OverflowError):  # what math.sin says of an infinite angle
+        new = State(*[math.nan] * 6)
+    if ns is math and not math.isfinite(sum(new)):
+        _refuse_non_finite(new, h)
+    return new, n
+
+
+def _refuse_non_finite(state: State, h: float) -> None:
+    for name, value in zip(State._fields, state, strict=True):
+        if not math.isfinite(value):
+            raise NonFiniteState(name, value, h)

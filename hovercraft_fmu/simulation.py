@@ -1,0 +1,394 @@
+"""Runs a scene on an FMU, through fmpy, or on the bare model; one kind of result."""
+
+import ast
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import isclose, isfinite
+from pathlib import Path
+from typing import Any, TypeAlias, cast
+
+import fmpy
+import fmpy.simulation
+import fmpy.util
+import numpy as np
+from numpy.typing import NDArray
+
+from .fmu.description import COMMUNICATION_STEP, MODEL_NAME, STOP_TIME
+from .fmu.interface import BY_NAME, CALCULATED, CRAFT_PARAMETERS, INPUTS, STATES, SUBSTEPS_MAX, observe
+from .fmu.package import build_fmu
+from .model.craft import Craft, preset
+from .model.dynamics import Controls, State
+from .model.integrators import integrator, integrator_number
+from .model.subcycling import Settings, advance
+from .scenes import Scene, Signals, scene, signals
+
+Value: TypeAlias = float | int | str
+"""Of a variable; an integrator may be given by its name."""
+Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
+"""A scene or its name; a CSV file (a name that ends in .csv); a structured array with `time` and input names."""
+Progress: TypeAlias = Callable[[float], None]
+"""Called with the time [s] reached, after every communication step."""
+
+DEFAULT_FMU = Path("build") / f"{MODEL_NAME}.fmu"
+
+
+class SimulationError(RuntimeError):
+    """A run that the FMU or the master ended; the message is the FMU's own."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """All that one run needs, checked."""
+
+    title: str
+    signals: Signals
+    start_values: Mapping[str, float | int]
+    start_time: float
+    """s"""
+    stop_time: float
+    """s"""
+    communication_step: float
+    """s"""
+
+    @property
+    def craft(self) -> Craft:
+        """The craft at the start. Raises ValueError where a parameter is impossible."""
+        return Craft(**{name: float(self.value(name)) for name in CRAFT_PARAMETERS})
+
+    @property
+    def settings(self) -> Settings:
+        """Sub-step and method."""
+        return Settings(float(self.value("step_size")), integrator(int(self.value("integrator"))))
+
+    @property
+    def start(self) -> State:
+        """The state at the start."""
+        return State(*(float(self.value(name)) for name in STATES))
+
+    def value(self, name: str) -> float | int:
+        """The start value of a variable."""
+        default = BY_NAME[name].start
+        return self.start_values.get(name, 0.0 if default is None else default)
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run gave: `result["time"]`, `result["pose.x"]`, ..., one value a communication point, shape (n,)."""
+
+    data: NDArray[np.void]
+    run: Run
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self.names:
+            raise ValueError(f"column = {name!r}: must be one of {', '.join(self.names)}")
+        return self.data[name]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the columns; the first is `time` [s], the others are variables of the FMU."""
+        return self.data.dtype.names or ()
+
+    @property
+    def distance(self) -> float:
+        """m: length of the path from communication point to communication point."""
+        return float(np.hypot(np.diff(self["pose.x"]), np.diff(self["pose.y"])).sum())
+
+    def write_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write all columns as CSV, with all digits. Raises OSError where that cannot be done."""
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        fmpy.util.write_csv(path, self.data)
+        return path
+
+
+def simulate(
+    scene_or_inputs: Inputs = "launch",
+    fmu: str | os.PathLike[str] | None = None,
+    *,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Result:
+    """Run a scene, or inputs of your own, on the FMU.
+
+    Args:
+        scene_or_inputs: see `Inputs`.
+        fmu: the file; without it build/Hovercraft.fmu under the current folder, which is built if it is not there.
+        progress: see `Progress`.
+        options: see `plan`: preset, start_values, start_time, stop_time, communication_step.
+
+    Raises:
+        ValueError: an input, a name or a value that cannot be; FileNotFoundError: no such file.
+        SimulationError: the FMU refused a value or a step, with its message; or the run ended early.
+    """
+    run = plan(scene_or_inputs, **options)
+    if fmu is None:
+        fmu = DEFAULT_FMU if DEFAULT_FMU.exists() else build_fmu(DEFAULT_FMU)
+    return run_fmu(run, fmu, progress)
+
+
+def plan(
+    scene_or_inputs: Inputs = "launch",
+    *,
+    preset: str | None = None,
+    start_values: Mapping[str, Value] | None = None,
+    start_time: float | None = None,
+    stop_time: float | None = None,
+    communication_step: float | None = None,
+) -> Run:
+    """Check and complete what a run needs.
+
+    Args:
+        scene_or_inputs: see `Inputs`.
+        preset: name of a craft; a scene has its own.
+        start_values: of parameters, inputs and states, by their names in the FMU; they come after the preset's.
+        start_time, stop_time: s; by default the first and the last time of the inputs.
+        communication_step: s; by default the scene's, else 0.01 s.
+
+    Raises:
+        ValueError: names the argument, the value and the rule.
+    """
+    chosen = _scene(scene_or_inputs)
+    table = chosen.signals if chosen else _signals(cast("str | os.PathLike[str] | Signals", scene_or_inputs))
+    values = _scene_values(chosen, preset) | _start_values(start_values or {})
+    first, last = float(table["time"][0]), float(table["time"][-1])
+    if len(table) == 1:
+        last = first + STOP_TIME
+    default_step = chosen.communication_step if chosen else COMMUNICATION_STEP
+    run = Run(
+        title=chosen.name if chosen else "recorded inputs",
+        signals=_completed(table, values),
+        start_values=values,
+        start_time=first if start_time is None else start_time,
+        stop_time=last if stop_time is None else stop_time,
+        communication_step=default_step if communication_step is None else communication_step,
+    )
+    _check_times(run)
+    return run
+
+
+def _scene(scene_or_inputs: Inputs) -> Scene | None:
+    if isinstance(scene_or_inputs, Scene):
+        return scene_or_inputs
+    if isinstance(scene_or_inputs, str) and not scene_or_inputs.endswith(".csv"):
+        return scene(scene_or_inputs)
+    return None
+
+
+def _signals(source: str | os.PathLike[str] | Signals) -> Signals:
+    if isinstance(source, np.ndarray):
+        return _checked(source, "inputs")
+    return read_inputs(source)
+
+
+def read_inputs(path: str | os.PathLike[str]) -> Signals:
+    """Read a control log: a CSV file in fmpy's format, with the columns `time` and names of inputs.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: names the file and what is wrong in it.
+    """
+    try:
+        table = fmpy.util.read_csv(path)
+    except (ValueError, IndexError) as error:
+        raise ValueError(f"{path}: must be a CSV file with a header and rows of as many numbers; {error}") from error
+    return _checked(table, str(path))
+
+
+def _checked(table: Signals, source: str) -> Signals:
+    names = table.dtype.names or ()
+    if not names or names[0] != "time" or len(table) == 0:
+        raise ValueError(f"{source}: the first column must be 'time', with at least one row; the columns are {names}")
+    for name in names[1:]:
+        if name not in INPUTS:
+            raise ValueError(f"{source}: column {name!r} must be an input: {', '.join(INPUTS)}")
+    for name in names:
+        for row, value in enumerate(table[name], 1):
+            if not isfinite(value):
+                raise ValueError(f"{source}: {name} = {value} in row {row}: must be a finite number")
+    back = np.flatnonzero(np.diff(table["time"]) < 0.0)
+    if back.size:
+        row = int(back[0]) + 2
+        raise ValueError(f"{source}: time = {table['time'][row - 1]} in row {row}: must not go back")
+    return table
+
+
+def _completed(table: Signals, values: Mapping[str, float | int]) -> Signals:
+    """All inputs have a column, so that none is left to chance: what is not given holds its start value."""
+    columns = []
+    for name in INPUTS:
+        given = name in (table.dtype.names or ())
+        columns.append(table[name] if given else np.full(len(table), values.get(name, BY_NAME[name].start)))
+    return signals(zip(table["time"], *columns, strict=True))
+
+
+def _scene_values(chosen: Scene | None, preset_name: str | None) -> dict[str, float | int]:
+    """What a scene and a preset set, by FMU names; only what differs from the FMU's own start values."""
+    craft = preset(preset_name or (chosen.preset if chosen else "textbook"))
+    values: dict[str, float | int] = {name: getattr(craft, name) for name in CRAFT_PARAMETERS}
+    if chosen:
+        values |= chosen.parameters
+        values |= dict(zip(STATES, chosen.start, strict=True))
+    return {name: value for name, value in values.items() if value != BY_NAME[name].start}
+
+
+def _start_values(given: Mapping[str, Value]) -> dict[str, float | int]:
+    return {name: start_value(name, value) for name, value in given.items()}
+
+
+def start_value(name: str, value: Value) -> float | int:
+    """The value as a number of the variable's type; an integrator may be given by name.
+
+    Raises:
+        ValueError: no such variable, one that cannot be set, or not a number.
+    """
+    variable = BY_NAME.get(name)
+    if variable is None or variable.start is None:
+        settable = ", ".join(each.name for each in BY_NAME.values() if each.start is not None)
+        raise ValueError(f"{name} = {value}: must be a variable that can be set: {settable}")
+    try:
+        if variable.kind == "Real":
+            return float(value)
+        if isinstance(value, str) and not value.isdigit():
+            return integrator_number(value)
+        return int(value)
+    except (TypeError, ValueError) as error:
+        if name == "integrator":
+            raise
+        raise ValueError(f"{name} = {value!r}: must be a number") from error
+
+
+def _check_times(run: Run) -> None:
+    for name in ("start_time", "stop_time", "communication_step"):
+        value = getattr(run, name)
+        if not isfinite(value):
+            raise ValueError(f"{name} = {value!r} s: must be a finite number")
+    if not run.communication_step > 0.0:
+        raise ValueError(f"communication_step = {run.communication_step!r} s: must be greater than 0")
+    if not run.stop_time > run.start_time:
+        raise ValueError(f"stop_time = {run.stop_time!r} s: must be after start_time = {run.start_time!r} s")
+
+
+# ---- on the FMU
+
+
+def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = None) -> Result:
+    """Run on an FMU, through fmpy, with its logging on. Raises as `simulate` does."""
+    path = Path(fmu)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{MODEL_NAME}.fmu")
+    description = read_description(path)
+    messages: list[str] = []
+
+    def step_finished(time: float, _recorder: object) -> bool:
+        if progress:
+            progress(time)
+        return True
+
+    with instantiated(path, description, messages) as (folder, instance):
+        try:
+            data = fmpy.simulate_fmu(
+                folder,
+                model_description=description,
+                fmu_instance=instance,
+                start_time=run.start_time,
+                stop_time=run.stop_time,
+                output_interval=run.communication_step,
+                start_values=dict(run.start_values),
+                input=run.signals,
+                output=[v.name for v in description.modelVariables if v.causality in ("input", "output", "local")],
+                step_finished=step_finished,
+            )
+        except Exception as error:
+            raise SimulationError("; ".join(messages) or str(error)) from error
+    if not isclose(data["time"][-1], run.stop_time):
+        raise SimulationError(f"the run ended at {data['time'][-1]!r} s: must reach stop_time = {run.stop_time!r} s")
+    return Result(np.asarray(data), run)
+
+
+def read_description(path: Path) -> Any:
+    """fmpy's model description. Raises ValueError where the file is no FMU or its description is not valid."""
+    try:
+        return fmpy.read_model_description(path)
+    except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
+        raise ValueError(f"{path}: must be an FMU with a valid model description; {error}") from error
+
+
+@contextmanager
+def instantiated(path: Path, description: Any, messages: list[str]) -> Iterator[tuple[str, Any]]:
+    """The folder an FMU is extracted to and an instance in it; both are gone afterwards.
+
+    Logging is on: without it pythonfmu's wrapper keeps its messages, even of errors, to itself.
+    """
+
+    def logger(_environment: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
+        if status:
+            messages.append(plain(message.decode(errors="replace")))
+
+    with tempfile.TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
+        fmpy.extract(path, unzipdir=folder)
+        try:
+            instance = fmpy.instantiate_fmu(folder, description, "CoSimulation", debug_logging=True, logger=logger)
+        except Exception as error:
+            raise SimulationError("; ".join(messages) or f"{path}: {error}") from error
+        try:
+            yield folder, instance
+        finally:
+            instance.freeInstance()
+
+
+def plain(message: str) -> str:
+    """What a message of pythonfmu's wrapper says, without the call and the kind of exception around it."""
+    last = message.strip().splitlines()[-1] if message.strip() else message
+    match = re.fullmatch(r"\w+\((?P<text>['\"].*['\"]),?\)", last)
+    return str(ast.literal_eval(match["text"])) if match else message.strip()
+
+
+# ---- on the bare model
+
+
+def run_model(run: Run) -> Result:
+    """Run on the bare model, with the communication points and the inputs that fmpy would give the FMU.
+
+    Raises:
+        ValueError, NonFiniteState: as the model does.
+    """
+    craft, settings, state = run.craft, run.settings, run.start
+    controls = _controls(run, run.start_time, after_event=False)
+    count = 0
+    rows = [(run.start_time, *controls, *state, *observe(state, controls, craft), count)]
+    for time, end in communication_points(run):
+        controls = _controls(run, time, after_event=True)
+        state, n = advance(state, controls, craft, end - time, settings)
+        count = min(count + n, SUBSTEPS_MAX)
+        rows.append((end, *controls, *state, *observe(state, controls, craft), count))
+    names = ("time", *INPUTS, *STATES, *CALCULATED)
+    return Result(np.array(rows, dtype=[*((name, np.float64) for name in names), ("substeps", np.int32)]), run)
+
+
+def _controls(run: Run, time: float, after_event: bool) -> Controls:
+    times = run.signals["time"]
+    table = np.stack([run.signals[name] for name in INPUTS])
+    values, _ = fmpy.simulation.Input.interpolate(time, times, table, after_event=after_event)
+    return Controls(*(float(value) for value in np.ravel(values)))
+
+
+def communication_points(run: Run) -> Iterator[tuple[float, float]]:
+    """(start, end) [s] of every communication step, as fmpy's master takes them: a jump in the inputs is one, too."""
+    times = run.signals["time"]
+    jumps = times[np.flatnonzero(np.diff(times) == 0.0)]
+    time, regular = run.start_time, 0
+    while not (time > run.stop_time or isclose(time, run.stop_time)):
+        next_regular = run.start_time + (regular + 1) * run.communication_step
+        ahead = [float(jump) for jump in jumps if jump > time and not isclose(jump, time)]
+        end = next_regular
+        if ahead and end > ahead[0] and not isclose(end, ahead[0]):
+            end = ahead[0]
+        if end > run.stop_time and not isclose(end, run.stop_time):
+            end = run.stop_time
+        yield time, end
+        time = end
+        regular += isclose(time, next_regular)
