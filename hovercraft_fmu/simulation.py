@@ -18,7 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fmu.description import COMMUNICATION_STEP, MODEL_NAME, STOP_TIME
-from .fmu.interface import BY_NAME, CALCULATED, CRAFT_PARAMETERS, INPUTS, STATES, SUBSTEPS_MAX, observe
+from .fmu.interface import (
+    ACTION,
+    BY_NAME,
+    CRAFT_PARAMETERS,
+    INPUTS,
+    MOTION,
+    STATES,
+    SUBSTEPS_MAX,
+    observe_action,
+    observe_motion,
+)
 from .fmu.package import build_fmu
 from .model.craft import Craft, preset
 from .model.dynamics import Controls, State
@@ -359,13 +369,17 @@ def run_model(run: Run) -> Result:
     craft, settings, state = run.craft, run.settings, run.start
     controls = _controls(run, run.start_time, after_event=False)
     count = 0
-    rows = [(run.start_time, *controls, *state, *observe(state, controls, craft), count)]
+
+    def row(time: float) -> tuple[float, ...]:
+        return time, *controls, *state, *observe_motion(state), *observe_action(state, controls, craft), count
+
+    rows = [row(run.start_time)]
     for time, end in communication_points(run):
         controls = _controls(run, time, after_event=True)
         state, n = advance(state, controls, craft, end - time, settings)
         count = min(count + n, SUBSTEPS_MAX)
-        rows.append((end, *controls, *state, *observe(state, controls, craft), count))
-    names = ("time", *INPUTS, *STATES, *CALCULATED)
+        rows.append(row(end))
+    names = ("time", *INPUTS, *STATES, *MOTION, *ACTION)
     return Result(np.array(rows, dtype=[*((name, np.float64) for name in names), ("substeps", np.int32)]), run)
 
 

@@ -172,15 +172,23 @@ INPUTS = ("thrust", "port_thruster", "starboard_thruster")
 STATES = ("pose.x", "pose.y", "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
 """In the order of State."""
 CRAFT_PARAMETERS = tuple(v.name for v in VARIABLES if v.name in Craft.__dataclass_fields__)
-CALCULATED = tuple(v.name for v in VARIABLES if v.start is None and v.variability == "continuous")
-"""In the order of `observe`."""
+MOTION = ("body.surge", "body.sway", "speed")
+"""In the order of `observe_motion`."""
+ACTION = (
+    "force.x", "force.y", "moment", "acceleration.x", "acceleration.y", "acceleration.yaw",
+    "applied.thrust", "applied.steering",
+)  # fmt: skip
+"""In the order of `observe_action`."""
 
 
-def observe(state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
-    """The calculated variables at a state, with the controls of the step that led to it; order of CALCULATED."""
+def observe_motion(state: State) -> tuple[float, float, float]:
+    """The calculated variables that follow from the state alone; order of MOTION."""
     surge, sway = body_velocity(state)
-    speed = sqrt(state.vx * state.vx + state.vy * state.vy)
+    return surge, sway, sqrt(state.vx * state.vx + state.vy * state.vy)
+
+
+def observe_action(state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
+    """What acts on the craft at a state, with the controls of the step that led to it; order of ACTION."""
     force_x, force_y, moment = loads(state, controls, craft)
     acceleration = (force_x / craft.mass, force_y / craft.mass, moment / craft.inertia)
-    applied = (saturate(controls, craft).thrust, steering(controls, craft))
-    return (surge, sway, speed, force_x, force_y, moment, *acceleration, *applied)
+    return force_x, force_y, moment, *acceleration, saturate(controls, craft).thrust, steering(controls, craft)

@@ -18,15 +18,17 @@ from ..model.integrators import integrator
 from ..model.subcycling import NonFiniteState, Settings, advance, check_step_size
 from .description import model_description
 from .interface import (
+    ACTION,
     BY_NAME,
-    CALCULATED,
     CRAFT_PARAMETERS,
     INPUTS,
+    MOTION,
     STATES,
     SUBSTEPS_MAX,
     VARIABLES,
     Variable,
-    observe,
+    observe_action,
+    observe_motion,
 )
 
 SAME_TIME = 1e-9
@@ -36,13 +38,15 @@ BY_REFERENCE = {variable.reference: variable for variable in VARIABLES}
 REALS = frozenset(v.reference for v in VARIABLES if v.kind == "Real")
 INTEGERS = frozenset(v.reference for v in VARIABLES if v.kind != "Real")
 THRUST, PORT, STARBOARD = (BY_NAME[name].reference for name in INPUTS)
-OBSERVED = tuple(BY_NAME[name].reference for name in STATES + CALCULATED)
-OBSERVED_SET = frozenset(OBSERVED) | {BY_NAME["projected_area"].reference}
+STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
+MOTION_REFERENCES = STATE_REFERENCES + tuple(BY_NAME[name].reference for name in MOTION)
+ACTION_REFERENCES = tuple(BY_NAME[name].reference for name in ACTION)
+INPUT_REFERENCES = frozenset((THRUST, PORT, STARBOARD))
+ACTION_SET = frozenset(ACTION_REFERENCES)
 STEP_SIZE = BY_NAME["step_size"].reference
 INTEGRATOR = BY_NAME["integrator"].reference
 SUBSTEPS = BY_NAME["substeps"].reference
 PROJECTED_AREA = BY_NAME["projected_area"].reference
-STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
 KEPT_REALS = tuple(
     v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES
 )
@@ -76,9 +80,7 @@ def called_by_wrapper(
 ) -> Callable[Concatenate["HovercraftSlave", P], R]:
     """A method that pythonfmu's wrapper calls; an exception leaves it in a shape that the wrapper survives.
 
-    On every exception the wrapper gives up its references to the class, the instance and the log queue, and again
-    when the instance is freed. One reference more to each of them balances that. And a message that is still queued
-    would turn the text of the exception into 'unknown error'.
+    The three methods that are called at every communication point do the same without the call in between.
     """
 
     @functools.wraps(method)
@@ -86,9 +88,7 @@ def called_by_wrapper(
         try:
             return method(self, *args, **kwargs)
         except Exception:
-            self.log_queue.clear()
-            for kept in (type(self), self, self.log_queue):
-                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            self._outlive_exception()
             raise
 
     return call
@@ -107,17 +107,17 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self._phase = Phase.INSTANTIATED
-        self._reals: dict[int, float] = {v.reference: float(v.start or 0.0) for v in VARIABLES if v.kind == "Real"}
-        self._integers: dict[int, int] = {v.reference: int(v.start or 0) for v in VARIABLES if v.kind != "Real"}
+        self._reals = {reference: float(BY_REFERENCE[reference].start or 0.0) for reference in REALS - ACTION_SET}
+        self._integers = {reference: int(BY_REFERENCE[reference].start or 0) for reference in INTEGERS}
         self._time = 0.0
         self._state = State()
         # with these the last step was made, and from these the outputs are calculated
         self._controls = Controls()
         self._craft = Craft()
         self._settings = Settings()
-        # set since then, to be taken up: parameters by the next step, everything by the next get
-        self._tuned = False
-        self._stale = True
+        self._tuned = False  # a parameter was set since then: the next step takes it up
+        self._stale = True  # the motion that is read is not yet that of the communication point
+        self._acting = False  # what acts on the craft is among the values that are read
 
     # ---- life cycle
 
@@ -139,34 +139,51 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
         self._take_up_start_values()
         self._phase = Phase.STEPPING
 
-    @called_by_wrapper
     def do_step(self, current_time: float, step_size: float) -> bool:
-        self._require("fmi2DoStep", Phase.STEPPING)
-        if not (math.isfinite(step_size) and step_size > 0.0):
-            raise ValueError(
-                f"communicationStepSize = {step_size!r} s: must be a finite number greater than 0"
-            )
-        if not abs(current_time - self._time) <= SAME_TIME * max(1.0, abs(self._time)):
-            raise ValueError(
-                f"currentCommunicationPoint = {current_time!r} s: must be where the last step ended, {self._time!r} s"
-            )
-        reals = self._reals
-        controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD])
-        craft = self._make_craft() if self._tuned else self._craft
         try:
-            state, n = advance(self._state, controls, craft, step_size, self._settings)
-        except NonFiniteState as error:
-            self._refuse_motion(error)
-        self._state, self._controls, self._craft, self._tuned = state, controls, craft, False
-        self._time = current_time + step_size
-        self._integers[SUBSTEPS] = min(self._integers[SUBSTEPS] + n, SUBSTEPS_MAX)
-        self._stale = True
-        return True
+            if self._phase is not Phase.STEPPING:
+                self._require("fmi2DoStep", Phase.STEPPING)
+            if not 0.0 < step_size < math.inf:
+                raise ValueError(
+                    f"communicationStepSize = {step_size!r} s: must be a finite number greater than 0"
+                )
+            time = self._time
+            if current_time != time and not abs(current_time - time) <= SAME_TIME * max(1.0, abs(time)):
+                raise ValueError(
+                    f"currentCommunicationPoint = {current_time!r} s: must be where the last step ended, {time!r} s"
+                )
+            reals = self._reals
+            controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD])
+            craft = self._make_craft() if self._tuned else self._craft
+            try:
+                state, n = advance(self._state, controls, craft, step_size, self._settings)
+            except NonFiniteState as error:
+                self._refuse_motion(error)
+            self._state, self._controls, self._craft, self._tuned = state, controls, craft, False
+            self._time = current_time + step_size
+            count = self._integers[SUBSTEPS] + n
+            self._integers[SUBSTEPS] = count if count < SUBSTEPS_MAX else SUBSTEPS_MAX
+            self._stale = True
+            return True
+        except Exception:
+            self._outlive_exception()
+            raise
 
     @called_by_wrapper
     def terminate(self) -> None:
         self._require("fmi2Terminate", Phase.STEPPING)
         self._phase = Phase.TERMINATED
+
+    def _outlive_exception(self) -> None:
+        """To be called before an exception leaves for pythonfmu's wrapper.
+
+        On every exception the wrapper gives up its references to the class, the instance and the log queue, and again
+        when the instance is freed: one reference more to each of them balances that. And a message that is still
+        queued would turn the text of the exception into 'unknown error'.
+        """
+        self.log_queue.clear()
+        for kept in (type(self), self, self.log_queue):
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
 
     def _require(self, call: str, phase: Phase) -> None:
         if self._phase is not phase:
@@ -182,15 +199,21 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
 
     # ---- variables
 
-    @called_by_wrapper
     def get_real(self, vrs: list[int]) -> list[float]:
-        if self._stale and not OBSERVED_SET.isdisjoint(vrs):
-            self._calculate()
-        reals = self._reals
         try:
-            return [reals[reference] for reference in vrs]
-        except KeyError as error:
-            raise _unknown("Real", error.args[0]) from None
+            if self._stale:
+                self._observe_motion()
+            try:
+                return list(map(self._reals.__getitem__, vrs))
+            except KeyError:  # what acts on the craft is worked out when it is asked for
+                self._observe_action()
+            try:
+                return list(map(self._reals.__getitem__, vrs))
+            except KeyError as error:
+                raise _unknown("Real", error.args[0]) from None
+        except Exception:
+            self._outlive_exception()
+            raise
 
     @called_by_wrapper
     def get_integer(self, vrs: list[int]) -> list[int]:
@@ -208,17 +231,23 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
     def get_string(self, vrs: list[int]) -> list[str]:
         raise _unknown("String", vrs[0])
 
-    @called_by_wrapper
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        # all are checked before one is set: a refused call changes nothing
-        settable = SETTABLE[self._phase]
-        for reference, value in zip(vrs, values, strict=True):
-            if reference not in REALS:
-                raise _unknown("Real", reference)
-            if reference > STARBOARD or reference not in settable or not math.isfinite(value):
-                self._check_set(BY_REFERENCE[reference], value)  # inputs come often and have no other rule
-        self._reals.update(zip(vrs, values, strict=True))
-        self._after_set(vrs)
+        try:
+            if self._phase is Phase.STEPPING and INPUT_REFERENCES.issuperset(vrs) and math.isfinite(sum(values)):
+                reals = self._reals
+                for reference, value in zip(vrs, values):  # noqa: B905 - the wrapper makes both of one length
+                    reals[reference] = value
+                return  # inputs come often and have no other rule
+            # all are checked before one is set: a refused call changes nothing
+            for reference, value in zip(vrs, values, strict=True):
+                if reference not in REALS:
+                    raise _unknown("Real", reference)
+                self._check_set(BY_REFERENCE[reference], value)
+            self._reals.update(zip(vrs, values, strict=True))
+            self._after_set(vrs)
+        except Exception:
+            self._outlive_exception()
+            raise
 
     @called_by_wrapper
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
@@ -255,7 +284,7 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
     def _after_set(self, vrs: list[int]) -> None:
         if self._phase is Phase.STEPPING:
             # what is read belongs to the communication point: it changes with the next step, not now
-            self._tuned = self._tuned or max(vrs, default=0) > STARBOARD
+            self._tuned = self._tuned or not INPUT_REFERENCES.issuperset(vrs)
         else:
             self._stale = True
 
@@ -272,12 +301,24 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
         self._tuned = False
         self._stale = True
 
-    def _calculate(self) -> None:
-        if self._phase in (Phase.INSTANTIATED, Phase.INITIALIZING):
+    def _observe_motion(self) -> None:
+        """Bring the values that are read up to the communication point."""
+        if not self._started():
             self._take_up_start_values()
-        state, controls, craft = self._state, self._controls, self._craft
-        self._reals.update(zip(OBSERVED, (*state, *observe(state, controls, craft)), strict=True))
+        state, reals = self._state, self._reals
+        reals.update(zip(MOTION_REFERENCES, state + observe_motion(state)))  # noqa: B905
+        if self._acting:
+            for reference in ACTION_REFERENCES:
+                del reals[reference]
+            self._acting = False
         self._stale = False
+
+    def _observe_action(self) -> None:
+        """The rest of them, which most hosts never ask for."""
+        if not self._acting:
+            action = observe_action(self._state, self._controls, self._craft)
+            self._reals.update(zip(ACTION_REFERENCES, action, strict=True))
+            self._acting = True
 
     # ---- FMU state
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import cast
 
@@ -16,6 +17,8 @@ class Craft:
 
     Raises:
         ValueError: names the parameter, the value and the rule.
+
+    Derived values are worked out when they are first asked for; a communication step asks for them every time.
     """
 
     mass: float = 100.0
@@ -52,22 +55,22 @@ class Craft:
                     f"thrust_min = {self.thrust_min!r} N: must not be above thrust_max = {self.thrust_max!r} N"
                 )
 
-    @property
+    @cached_property
     def projected_area(self) -> float:
         """m2: the mean of the areas seen bow-on and abeam, (L + W)/2 * H."""
         return (self.length + self.width) / 2 * self.height
 
-    @property
+    @cached_property
     def drag_factor(self) -> float:
         """kg/m: k of the drag force k*q*q at the air speed q, 0.5*rho*A*Cd."""
         return 0.5 * self.air_density * self.projected_area * self.drag_coefficient
 
-    @property
+    @cached_property
     def drag_center(self) -> float:
         """m: x of the centre of drag in the body frame; negative is behind the centre of gravity."""
         return self.drag_center_fraction * self.length
 
-    @property
+    @cached_property
     def thruster_moment(self) -> float:
         """N.m: yaw moment of the port bow thruster, full on; its lever arm is half the length."""
         return 0.5 * self.length * self.steering_force

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 from .craft import Craft
 
 Namespace: TypeAlias = Any
-"""A module with sin, cos and sqrt: `math` for floats, `numpy` for arrays."""
+"""`math` for floats; for arrays `numpy`, or a module with its sin, cos, sqrt and clip."""
 
 
 class State(NamedTuple):
@@ -76,7 +76,7 @@ LoadFunction: TypeAlias = Callable[[float, float, float, float], tuple[float, fl
 
 def saturate(controls: Controls, craft: Craft, ns: Namespace = math) -> Controls:
     """The controls held inside their limits: thrust in the craft's, thruster commands from 0 to 1."""
-    clip = getattr(ns, "clip", _clip)
+    clip = _clip if ns is math else ns.clip
     return Controls(
         clip(controls.thrust, craft.thrust_min, craft.thrust_max),
         clip(controls.port, 0.0, 1.0),
@@ -138,9 +138,10 @@ def derivatives(state: State, controls: Controls, craft: Craft, ns: Namespace = 
 
 def body_velocity(state: State, ns: Namespace = math) -> tuple[float, float]:
     """Surge and sway [m/s]: the velocity of the centre of gravity in the body frame."""
-    c = ns.cos(state.heading)
-    s = ns.sin(state.heading)
-    return c * state.vx + s * state.vy, c * state.vy - s * state.vx
+    _, _, heading, vx, vy, _ = state
+    c = ns.cos(heading)
+    s = ns.sin(heading)
+    return c * vx + s * vy, c * vy - s * vx
 
 
 def kinetic_energy(state: State, craft: Craft) -> float:

@@ -36,7 +36,7 @@ class NonFiniteState(ArithmeticError):
 
 def check_step_size(step_size: float) -> None:
     """Raises ValueError unless the sub-step is a positive finite number."""
-    if not (math.isfinite(step_size) and step_size > 0.0):
+    if not 0.0 < step_size < math.inf:
         raise ValueError(f"step_size = {step_size!r} s: must be a finite number greater than 0")
 
 
@@ -50,17 +50,17 @@ def substeps(communication_step: float, step_size: float) -> tuple[int, float]:
     Raises:
         ValueError: a step that is negative or not finite, or would need more than 10^9 sub-steps.
     """
-    if not (math.isfinite(communication_step) and communication_step >= 0.0):
+    if not 0.0 <= communication_step < math.inf:
         raise ValueError(f"communication step = {communication_step!r} s: must be a finite number, not negative")
     check_step_size(step_size)
     ratio = communication_step / step_size
     if ratio > MAX_SUBSTEPS + 1:
         raise _too_many(communication_step, step_size)
-    whole = max(1, round(ratio))
+    whole = round(ratio) or 1
     if abs(whole * step_size - communication_step) <= WHOLE * communication_step:
         n, h = whole, step_size
     else:
-        n = max(1, math.ceil(ratio))
+        n = math.ceil(ratio) or 1
         h = communication_step / n
     if n > MAX_SUBSTEPS:
         raise _too_many(communication_step, step_size)
