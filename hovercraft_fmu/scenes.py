@@ -19,6 +19,11 @@ Row: TypeAlias = tuple[float, float, float, float]
 Signals: TypeAlias = NDArray[np.void]
 """Structured array with the fields `time` and names of inputs; linear between rows, a jump is two rows at one time."""
 
+Times: TypeAlias = NDArray[np.float64]
+"""s, shape (n,)."""
+Trajectory: TypeAlias = tuple[NDArray[np.float64], ...]
+"""The components of the state, in their order, shape (n,) each."""
+
 CONTROL_LOGS = Path(__file__).parent / "controls"
 
 
@@ -35,8 +40,8 @@ class Scene:
     start: State = State()  # noqa: RUF009 - immutable
     communication_step: float = 0.1
     """s"""
-    exact: Callable[[NDArray[np.float64]], State] | None = None
-    """The exact solution, where there is one: times [s], shape (n,) -> state of arrays, shape (n,) each."""
+    exact: Callable[[Times], Trajectory] | None = None
+    """The exact solution, where there is one."""
 
     @property
     def stop_time(self) -> float:
@@ -85,7 +90,7 @@ def _control_log(name: str) -> tuple[Row, ...]:
     return tuple((float(t), float(thrust), float(port), float(starboard)) for t, thrust, port, starboard in table)
 
 
-def _launch(times: NDArray[np.float64]) -> State:
+def _launch(times: Times) -> Trajectory:
     """From rest at constant thrust T: v = v_t*tanh(t/tau), x = v_t*tau*ln(cosh(t/tau)), tau = m*v_t/T."""
     craft, thrust = Craft(), 5.0
     terminal = math.sqrt(thrust / craft.drag_factor)
@@ -94,32 +99,32 @@ def _launch(times: NDArray[np.float64]) -> State:
     # ln(cosh(z)) = z + ln((1 + exp(-2z))/2), which does not overflow
     z = times / tau
     log_cosh = z + np.log1p(np.exp(-2.0 * z)) - math.log(2.0)
-    return State(terminal * tau * log_cosh, zero, zero, terminal * np.tanh(z), zero, zero)
+    return terminal * tau * log_cosh, zero, zero, terminal * np.tanh(z), zero, zero
 
 
 COAST_SPEED = 2.0
 """m/s"""
 
 
-def _coast(times: NDArray[np.float64]) -> State:
+def _coast(times: Times) -> Trajectory:
     """Without thrust, straight: v = v0/(1 + kappa*v0*t), x = ln(1 + kappa*v0*t)/kappa, kappa = k/m."""
     craft = Craft()
     kappa = craft.drag_factor / craft.mass
     zero = np.zeros_like(times)
     growth = 1.0 + kappa * COAST_SPEED * times
-    return State(np.log(growth) / kappa, zero, zero, COAST_SPEED / growth, zero, zero)
+    return np.log(growth) / kappa, zero, zero, COAST_SPEED / growth, zero, zero
 
 
 CYCLOID_YAW_RATE = 2.0 * math.pi / 30.0
 """rad/s"""
 
 
-def _cycloid(times: NDArray[np.float64]) -> State:
+def _cycloid(times: Times) -> Trajectory:
     """No drag, constant thrust T and yaw rate w: v = T/(m*w)*(sin wt, 1 - cos wt), and its integral."""
     craft, thrust, w = Craft(), 5.0, CYCLOID_YAW_RATE
     turned = w * times
     speed = thrust / (craft.mass * w)
-    return State(
+    return (
         speed / w * (1.0 - np.cos(turned)),
         speed / w * (turned - np.sin(turned)),
         turned,

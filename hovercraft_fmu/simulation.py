@@ -169,7 +169,7 @@ def plan(
         last = first + STOP_TIME
     default_step = chosen.communication_step if chosen else COMMUNICATION_STEP
     run = Run(
-        title=chosen.name if chosen else "recorded inputs",
+        title=_title(chosen, scene_or_inputs),
         signals=_completed(table, values),
         start_values=values,
         start_time=first if start_time is None else start_time,
@@ -186,6 +186,12 @@ def _scene(scene_or_inputs: Inputs) -> Scene | None:
     if isinstance(scene_or_inputs, str) and not scene_or_inputs.endswith(".csv"):
         return scene(scene_or_inputs)
     return None
+
+
+def _title(chosen: Scene | None, scene_or_inputs: Inputs) -> str:
+    if chosen:
+        return chosen.name
+    return "inputs" if isinstance(scene_or_inputs, np.ndarray) else Path(cast(str, scene_or_inputs)).name
 
 
 def _signals(source: str | os.PathLike[str] | Signals) -> Signals:
@@ -319,10 +325,10 @@ def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = N
     return Result(np.asarray(data), run)
 
 
-def read_description(path: Path) -> Any:
+def read_description(path: Path, validate: bool = True) -> Any:
     """fmpy's model description. Raises ValueError where the file is no FMU or its description is not valid."""
     try:
-        return fmpy.read_model_description(path)
+        return fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
         raise ValueError(f"{path}: must be an FMU with a valid model description; {error}") from error
 
@@ -364,7 +370,7 @@ def run_model(run: Run) -> Result:
     """Run on the bare model, with the communication points and the inputs that fmpy would give the FMU.
 
     Raises:
-        ValueError, NonFiniteState: as the model does.
+        ValueError, NonFiniteError: as the model does.
     """
     craft, settings, state = run.craft, run.settings, run.start
     controls = _controls(run, run.start_time, after_event=False)

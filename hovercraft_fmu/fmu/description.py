@@ -95,9 +95,7 @@ def _types(parent: Element) -> None:
     node = SubElement(parent, "SimpleType", {"name": "Integrator", "description": "Numerical method of a sub-step"})
     enumeration = SubElement(node, "Enumeration", {"quantity": "Integrator"})
     for number, method in enumerate(INTEGRATORS, 1):
-        SubElement(
-            enumeration, "Item", {"name": method.name, "value": str(number), "description": method.description}
-        )
+        SubElement(enumeration, "Item", {"name": method.name, "value": str(number), "description": method.description})
 
 
 def _variable(parent: Element, variable: Variable) -> None:

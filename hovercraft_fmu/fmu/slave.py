@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Callable
 from enum import Enum
-from typing import Any, ClassVar, Concatenate, NoReturn, ParamSpec, TypeVar
+from typing import Any, ClassVar, Concatenate, NoReturn, ParamSpec, TypeVar, cast
 from xml.etree.ElementTree import Element
 
 from pythonfmu.fmi2slave import Fmi2Slave
@@ -15,7 +15,7 @@ from pythonfmu.fmi2slave import Fmi2Slave
 from ..model.craft import Craft, check_parameter
 from ..model.dynamics import Controls, State
 from ..model.integrators import integrator
-from ..model.subcycling import NonFiniteState, Settings, advance, check_step_size
+from ..model.subcycling import NonFiniteError, Settings, advance, check_step_size
 from .description import model_description
 from .interface import (
     ACTION,
@@ -47,9 +47,7 @@ STEP_SIZE = BY_NAME["step_size"].reference
 INTEGRATOR = BY_NAME["integrator"].reference
 SUBSTEPS = BY_NAME["substeps"].reference
 PROJECTED_AREA = BY_NAME["projected_area"].reference
-KEPT_REALS = tuple(
-    v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES
-)
+KEPT_REALS = tuple(v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES)
 """What a host sets and the slave keeps as it was set: inputs and parameters."""
 DIGEST_SIZE = 64
 """Bytes of the hexadecimal SHA-256 ahead of a serialized state."""
@@ -91,7 +89,7 @@ def called_by_wrapper(
             self._outlive_exception()
             raise
 
-    return call
+    return cast(Callable[Concatenate["HovercraftSlave", P], R], call)
 
 
 class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no types
@@ -144,9 +142,7 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
             if self._phase is not Phase.STEPPING:
                 self._require("fmi2DoStep", Phase.STEPPING)
             if not 0.0 < step_size < math.inf:
-                raise ValueError(
-                    f"communicationStepSize = {step_size!r} s: must be a finite number greater than 0"
-                )
+                raise ValueError(f"communicationStepSize = {step_size!r} s: must be a finite number greater than 0")
             time = self._time
             if current_time != time and not abs(current_time - time) <= SAME_TIME * max(1.0, abs(time)):
                 raise ValueError(
@@ -157,7 +153,7 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
             craft = self._make_craft() if self._tuned else self._craft
             try:
                 state, n = advance(self._state, controls, craft, step_size, self._settings)
-            except NonFiniteState as error:
+            except NonFiniteError as error:
                 self._refuse_motion(error)
             self._state, self._controls, self._craft, self._tuned = state, controls, craft, False
             self._time = current_time + step_size
@@ -189,7 +185,7 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
         if self._phase is not phase:
             raise RuntimeError(f"{call} in state '{self._phase.value}': must be called in state '{phase.value}'")
 
-    def _refuse_motion(self, error: NonFiniteState) -> NoReturn:
+    def _refuse_motion(self, error: NonFiniteError) -> NoReturn:
         name = STATES[State._fields.index(error.component)]
         raise ValueError(
             f"{name} = {error.value!r} after {self._time!r} s: must stay a finite number; the step was refused and "
@@ -339,9 +335,7 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
     @called_by_wrapper
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         if state["build"] != self.build:
-            raise ValueError(
-                f"FMU state of build {state['build']!r}: must be a state of this build, {self.build!r}"
-            )
+            raise ValueError(f"FMU state of build {state['build']!r}: must be a state of this build, {self.build!r}")
         self._phase = Phase[state["phase"]]
         self._time = state["time"]
         self._reals.update(zip(KEPT_REALS, state["reals"], strict=True))

@@ -21,7 +21,7 @@ class Settings(NamedTuple):
     integrator: Integrator = INTEGRATORS[0]
 
 
-class NonFiniteState(ArithmeticError):
+class NonFiniteError(ArithmeticError):
     """A step that led to NaN or infinity; the state before it still stands."""
 
     def __init__(self, component: str, value: float, substep: float) -> None:
@@ -88,7 +88,7 @@ def advance(
 
     Raises:
         ValueError: see `substeps`.
-        NonFiniteState: the motion left the range of numbers (plain floats only; arrays of craft are not searched).
+        NonFiniteError: the motion left the range of numbers (plain floats only; arrays of craft are not searched).
     """
     if communication_step == 0.0:
         return state, 0
@@ -103,6 +103,7 @@ def advance(
 
 
 def _refuse_non_finite(state: State, h: float) -> None:
-    for name, value in zip(State._fields, state, strict=True):
+    for name in ("vx", "vy", "yaw_rate", "x", "y", "heading"):  # it is a velocity that runs away first
+        value = getattr(state, name)
         if not math.isfinite(value):
-            raise NonFiniteState(name, value, h)
+            raise NonFiniteError(name, value, h)

@@ -1,0 +1,223 @@
+"""The command hovercraft-fmu: a thin layer over the functions of the package."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from ._version import __version__
+from .fmu.package import build_fmu
+from .model.craft import PRESETS
+from .scenes import CONTROL_LOGS, SCENES
+from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, plan, simulate
+from .validation import validate
+
+DEMO_FOLDER = Path("build") / "demo"
+DEMO_LOG = CONTROL_LOGS / "ice.csv"
+OUTPUT = Console(soft_wrap=True, highlight=False, width=None if sys.stdout.isatty() else 160)
+EXPECTED = (ValueError, OSError, ArithmeticError, SimulationError, ModuleNotFoundError)
+"""What a wrong name, file or value ends in: one line, no traceback."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command and leave the process: status 0, or 1 after one line that says what is wrong."""
+    try:
+        status = commands.main(arguments, prog_name="hovercraft-fmu", standalone_mode=False)
+    except click.exceptions.Abort:
+        sys.exit("hovercraft-fmu: stopped")
+    except click.ClickException as error:
+        sys.exit(f"hovercraft-fmu: {error.format_message()}")
+    except EXPECTED as error:
+        sys.exit("hovercraft-fmu: " + _one_line(error))
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, message="%(version)s")
+@click.pass_context
+def commands(context: click.Context) -> None:
+    """Build, check, run and draw the hovercraft FMU.
+
+    \b
+    New here?
+      hovercraft-fmu demo                          build, check and drive it; see build/demo/
+      hovercraft-fmu build                         write build/Hovercraft.fmu
+      hovercraft-fmu simulate --scene turn --plot turn.png
+      hovercraft-fmu simulate --help               what can be set
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+@commands.command()
+def build() -> None:
+    """Write build/Hovercraft.fmu under the current folder."""
+    path = build_fmu()
+    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, FMI 2.0 co-simulation")
+
+
+@commands.command("simulate")
+@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
+@click.option(
+    "--input", "log", metavar="FILE.csv", type=click.Path(path_type=Path),
+    help="A control log: columns time, thrust, port_thruster, starboard_thruster; linear between rows, two rows at one "
+    "time are a jump.",
+)  # fmt: skip
+@click.option("--preset", metavar="NAME", help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--start-time", type=float, metavar="S", help="Default: the first time of the inputs.")
+@click.option("--stop-time", type=float, metavar="S", help="Default: the last time of the inputs.")
+@click.option("--communication-step", type=float, metavar="S", help="Default: the scene's, or 0.01 s.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+@click.option("--output", type=click.Path(path_type=Path), metavar="FILE.csv", help="Write all columns.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the run.")
+@click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
+def simulate_command(
+    fmu: Path | None,
+    scene: str | None,
+    log: Path | None,
+    settings: tuple[str, ...],
+    output: Path | None,
+    plot: Path | None,
+    list_scenes: bool,
+    **options: Any,
+) -> None:
+    """Run the FMU through fmpy: a named scene, or a control log.
+
+    FMU is the file; without it build/Hovercraft.fmu, which is built if it is not there.
+    """
+    if list_scenes:
+        return _print_scenes()
+    if scene and log:
+        raise click.UsageError("--scene and --input: must not be given together")
+    start_values = dict(_setting(text) for text in settings)
+    inputs: Inputs = log if log else scene or "launch"
+    result = _simulated(inputs, fmu, start_values=start_values, **options)
+    _print_result(result)
+    _write(result, output, plot)
+    return None
+
+
+@commands.command("validate")
+@click.argument("fmus", nargs=-1, metavar="[FMU ...]", type=click.Path(path_type=Path))
+def validate_command(fmus: tuple[Path, ...]) -> int:
+    """Check FMUs: the schema, fmpy's validation, and a real run. Default: build/Hovercraft.fmu."""
+    problems = sum(_validated(fmu) for fmu in fmus or (DEFAULT_FMU,))
+    if problems:
+        raise click.ClickException(f"{problems} problem{'s' if problems > 1 else ''} found")
+    return 0
+
+
+@commands.command()
+def demo() -> None:
+    """Build the FMU, check it, and drive it over a recorded control log; see build/demo/."""
+    fmu = build_fmu()
+    OUTPUT.print(f"built {fmu}")
+    if _validated(fmu):
+        raise click.ClickException("the FMU is not valid")
+    result = _simulated(DEMO_LOG, fmu, preset="ice", communication_step=SCENES["ice"].communication_step)
+    _print_result(result)
+    _write(result, DEMO_FOLDER / "ice.csv", DEMO_FOLDER / "ice.png")
+    OUTPUT.print(
+        "\nWorth trying next:\n"
+        "  hovercraft-fmu simulate --scene turn --plot build/turn.png\n"
+        "  hovercraft-fmu simulate --scene ice --set mass=200 --plot build/heavy.png\n"
+        "  hovercraft-fmu simulate --list-scenes"
+    )
+
+
+@commands.command()
+def benchmark() -> None:
+    """Measure what a step costs: reference loop, bare model, FMU through fmpy; side by side, as ratios."""
+    from .trade.benchmark import measure
+
+    OUTPUT.print(measure())
+
+
+# ---- what the commands share
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split())
+
+
+def _setting(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise click.UsageError(f"--set {text}: must be NAME=VALUE")
+    return name.strip(), value.strip()
+
+
+@contextmanager
+def _progress(stop_time: float) -> Iterator[Callable[[float], None]]:
+    """A bar with the time left, on a terminal; it goes away when the run has ended."""
+    columns = (TextColumn("simulating"), BarColumn(), TextColumn("{task.completed:.0f} s"), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("", total=stop_time)
+        yield lambda time: progress.update(task, completed=time)
+
+
+def _simulated(inputs: Inputs, fmu: Path | None, **options: Any) -> Result:
+    stop_time = plan(inputs, **options).stop_time
+    with _progress(stop_time) as progress:
+        return simulate(inputs, fmu, progress=progress, **options)
+
+
+def _validated(fmu: Path) -> int:
+    """Check one FMU, print what was checked, and return the number of problems."""
+    OUTPUT.print(f"checking {fmu}")
+    problems = 0
+    for check in validate(fmu):
+        OUTPUT.print(f"  {'ok    ' if not check.problems else 'FAILED'} {check.what} ({check.checker})")
+        for problem in check.problems:
+            OUTPUT.print(f"         {problem}", markup=False)
+        problems += len(check.problems)
+    return problems
+
+
+def _print_scenes() -> None:
+    table = Table(box=None, pad_edge=False)
+    for title in ("scene", "what happens", "craft", "duration", "exact solution"):
+        table.add_column(title)
+    for scene in SCENES.values():
+        exact = "yes" if scene.exact else ""
+        table.add_row(scene.name, scene.description, scene.preset, f"{scene.stop_time:g} s", exact)
+    OUTPUT.print(table)
+
+
+def _print_result(result: Result) -> None:
+    run = result.run
+    table = Table(title=run.title, title_justify="left", show_header=False, box=None, pad_edge=False)
+    rows = {
+        "duration": f"{result['time'][-1] - run.start_time:g} s, {len(result['time']) - 1} communication steps",
+        "sub-steps": f"{result['substeps'][-1]}",
+        "distance": f"{result.distance:.2f} m, {result.distance / run.craft.length:.1f} craft lengths",
+        "largest speed": f"{result['speed'].max():.3f} m/s",
+        "headings": f"{np.degrees(result['pose.heading'].min()):.1f} ... "
+        f"{np.degrees(result['pose.heading'].max()):.1f} deg",
+        "end position": f"({result['pose.x'][-1]:.3f}, {result['pose.y'][-1]:.3f}) m",
+        "end heading": f"{np.degrees(result['pose.heading'][-1]):.2f} deg",
+        "end speed": f"{result['speed'][-1]:.4f} m/s",
+    }
+    for name, text in rows.items():
+        table.add_row(name, text)
+    OUTPUT.print(table)
+
+
+def _write(result: Result, output: Path | None, plot: Path | None) -> None:
+    if output:
+        OUTPUT.print(f"wrote {result.write_csv(output)}")
+    if plot:
+        from .view.plots import plot_run
+
+        OUTPUT.print(f"wrote {plot_run(result, plot)}")

@@ -1,0 +1,1 @@
+"""What speed costs and what accuracy costs."""

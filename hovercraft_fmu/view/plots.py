@@ -1,0 +1,114 @@
+"""Pictures of a run."""
+
+import importlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..simulation import Result
+from .outline import outline
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+CRAFT_COUNT = 25
+"""Outlines along the path."""
+SEA, CRAFT, PORT, STARBOARD, SWAY = "#0b4f6c", "#d3e7f0b0", "#c8102e", "#2a9d4b", "#f08a24"
+"""Port is red, starboard is green, as at sea."""
+
+
+def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
+    """Draw the path with the craft along it, the controls, the speeds and the heading over time, as a PNG.
+
+    Raises:
+        ModuleNotFoundError: matplotlib is not installed; says how to install it.
+        OSError: the file cannot be written.
+    """
+    path = Path(path)
+    figure = _figure(figsize=(12.0, 6.75), dpi=120, layout="constrained")
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
+    figure.suptitle(f"{result.run.title}: {result.distance:.0f} m in {result['time'][-1] - result['time'][0]:g} s")
+    _draw_path(figure.add_subplot(grid[:, 0]), result)
+    controls = figure.add_subplot(grid[0, 1])
+    speed = figure.add_subplot(grid[1, 1], sharex=controls)
+    heading = figure.add_subplot(grid[2, 1], sharex=controls)
+    _draw_controls(controls, result)
+    _draw_speed(speed, result)
+    _draw_heading(heading, result)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, format="png", metadata={"Software": None})
+    return path
+
+
+def _figure(**options: Any) -> "Figure":
+    try:
+        module = importlib.import_module("matplotlib.figure")
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            "pictures need matplotlib, which is not installed: pip install 'hovercraft-fmu[plot]'"
+        ) from error
+    figure: Figure = module.Figure(**options)
+    return figure
+
+
+def _draw_path(axes: "Axes", result: Result) -> None:
+    x, y = result["pose.x"], result["pose.y"]
+    axes.plot(x, y, color=SEA, linewidth=1.0)
+    body_x, body_y = np.array(outline(result.run.craft)).T
+    # evenly in time: where the craft is fast they stand apart
+    for i in np.linspace(0, len(x) - 1, CRAFT_COUNT).astype(int):
+        c, s = np.cos(result["pose.heading"][i]), np.sin(result["pose.heading"][i])
+        hull_x, hull_y = x[i] + c * body_x - s * body_y, y[i] + s * body_x + c * body_y
+        axes.fill(hull_x, hull_y, facecolor=CRAFT, edgecolor=SEA, linewidth=0.9, zorder=3)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.invert_yaxis()
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m], downward")
+    axes.set_title(f"Path; the craft every {(result['time'][-1] - result['time'][0]) / (CRAFT_COUNT - 1):.3g} s")
+    axes.grid(alpha=0.3)
+
+
+def _draw_controls(axes: "Axes", result: Result) -> None:
+    time = result["time"]
+    thrust = axes.plot(time, result["applied.thrust"], color=SEA, label="thrust")
+    axes.set_ylabel("thrust [N]")
+    right = axes.twinx()
+    port = right.fill_between(
+        time, result["port_thruster"], step="pre", color=PORT, alpha=0.55, linewidth=0, label="port thruster"
+    )
+    starboard = right.fill_between(
+        time, -result["starboard_thruster"], step="pre", color=STARBOARD, alpha=0.55, linewidth=0,
+        label="starboard thruster",
+    )  # fmt: skip
+    right.set_ylim(-1.1, 1.1)
+    right.set_yticks((-1.0, 0.0, 1.0), ("stbd", "off", "port"))
+    low, high = axes.get_ylim()
+    size = 1.1 * max(abs(low), abs(high), 1.0)
+    axes.set_ylim(-size, size)
+    axes.legend(handles=[*thrust, port, starboard], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3,
+                fontsize="small", frameon=False, borderaxespad=0.2)  # fmt: skip
+    axes.set_title("Controls", loc="left")
+    axes.grid(alpha=0.3)
+
+
+def _draw_speed(axes: "Axes", result: Result) -> None:
+    time = result["time"]
+    axes.plot(time, result["speed"], color="black", linewidth=1.6, label="speed")
+    axes.plot(time, result["body.surge"], color=SEA, label="surge")
+    axes.plot(time, result["body.sway"], color=SWAY, label="sway")
+    axes.set_ylabel("[m/s]")
+    axes.set_title("Speed", loc="left")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize="small", frameon=False,
+                borderaxespad=0.2)  # fmt: skip
+    axes.grid(alpha=0.3)
+
+
+def _draw_heading(axes: "Axes", result: Result) -> None:
+    axes.plot(result["time"], np.degrees(result["pose.heading"]), color=SEA)
+    axes.set_ylabel("[deg], to starboard")
+    axes.set_xlabel("time [s]")
+    axes.set_title("Heading", loc="left")
+    axes.grid(alpha=0.3)

@@ -1,0 +1,55 @@
+"""What the tests share: one FMU, fresh processes, and no silent skip where skipping is not allowed."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TypeAlias
+
+import pytest
+from hypothesis import settings
+
+from hovercraft_fmu import build_fmu
+
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
+
+ROOT = Path(__file__).parent.parent
+Fresh: TypeAlias = Callable[..., str]
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of this tree."""
+    return build_fmu(tmp_path_factory.mktemp("fmu") / "Hovercraft.fmu")
+
+
+@pytest.fixture
+def fresh(tmp_path: Path) -> Fresh:
+    """Run Python code in a process of its own, in an empty folder, warnings as errors; return what it printed."""
+
+    def run(code: str, *arguments: object, flags: tuple[str, ...] = (), env: Mapping[str, str] | None = None) -> str:
+        command = [sys.executable, "-W", "error", *flags, "-c", code, *map(str, arguments)]
+        done = subprocess.run(
+            command, cwd=tmp_path, env={**os.environ, **(env or {})}, capture_output=True, text=True, timeout=300
+        )
+        assert done.returncode == 0, f"{done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    return run
+
+
+skipped: list[str] = []
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.skipped:
+        skipped.append(report.nodeid)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Where CI is set every test must run: a skip is a failure."""
+    if os.environ.get("CI") and skipped and session.exitstatus == pytest.ExitCode.OK:
+        print(f"\nskipped, which CI does not allow: {', '.join(skipped)}")
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED

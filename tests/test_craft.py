@@ -1,0 +1,63 @@
+import math
+from dataclasses import FrozenInstanceError, fields
+
+import numpy as np
+import pytest
+
+from hovercraft_fmu.model.craft import PRESETS, Craft, preset
+
+
+def test_defaults_are_the_textbook_craft() -> None:
+    craft = Craft()
+    assert (craft.mass, craft.inertia) == (100.0, 500.0)
+    assert (craft.length, craft.width, craft.height) == (20.0, 10.0, 5.0)
+    assert (craft.drag_coefficient, craft.air_density, craft.drag_center_fraction) == (1.25, 1.225, -0.25)
+    assert (craft.steering_force, craft.thrust_min, craft.thrust_max) == (3.0, 0.0, 10.0)
+    assert PRESETS["textbook"] == craft
+    assert PRESETS["ice"] == Craft(air_density=0.0023769)
+
+
+def test_derived_values() -> None:
+    craft = Craft()
+    assert craft.projected_area == 75.0
+    assert craft.drag_center == -5.0
+    assert craft.thruster_moment == 30.0
+    assert craft.drag_factor / craft.mass == pytest.approx(0.574218750, rel=1e-15)  # kappa of the model's page
+    assert not {"projected_area", "drag_center", "thruster_moment", "drag_factor"} & {f.name for f in fields(Craft)}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "rule"),
+    [
+        *((name, value, "greater than 0") for name in ("mass", "inertia", "length", "width", "height")
+          for value in (0.0, -1.0)),
+        *((name, -1e-9, "not be negative") for name in ("drag_coefficient", "air_density", "steering_force")),
+        *((field.name, value, "finite") for field in fields(Craft) for value in (math.nan, math.inf, -math.inf)),
+        ("drag_center_fraction", 0.51, "-0.5"),
+        ("drag_center_fraction", -0.51, "-0.5"),
+        ("thrust_min", 10.5, "thrust_max"),
+        ("thrust_max", -0.5, "thrust_max"),
+    ],
+)  # fmt: skip
+def test_impossible_values_are_named(name: str, value: float, rule: str) -> None:
+    with pytest.raises(ValueError, match=rule) as caught:
+        Craft(**{name: value})
+    assert name in str(caught.value)
+    assert repr(value) in str(caught.value)
+
+
+def test_a_batch_is_checked_craft_by_craft() -> None:
+    with pytest.raises(ValueError, match=r"mass = -2\.0: must be greater than 0"):
+        Craft(mass=np.array([1.0, -2.0, 3.0]))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="thrust_max"):
+        Craft(thrust_max=np.array([1.0, -2.0]))  # type: ignore[arg-type]
+
+
+def test_frozen() -> None:
+    with pytest.raises(FrozenInstanceError):
+        Craft().mass = 1.0  # type: ignore[misc]
+
+
+def test_unknown_preset_names_the_known_ones() -> None:
+    with pytest.raises(ValueError, match="'moon': must be one of textbook, ice"):
+        preset("moon")
