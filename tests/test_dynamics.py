@@ -1,5 +1,6 @@
 import math
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,9 +35,7 @@ def test_loads_agree_with_the_page_written_down_again(craft: Craft, state: State
 
 
 @given(crafts, states, controls, numbers(1e-4, 1e-2))
-def test_a_step_agrees_with_the_page_written_down_again(
-    craft: Craft, state: State, asked: Controls, h: float
-) -> None:
+def test_a_step_agrees_with_the_page_written_down_again(craft: Craft, state: State, asked: Controls, h: float) -> None:
     ours, n = advance(state, asked, craft, h, Settings(h))
     theirs = reference_step(state, asked, asdict(craft), h)
     _, _, force_size, moment_size = reference_loads(state, asked, asdict(craft))
@@ -154,9 +153,10 @@ def test_without_drag_a_spinning_craft_goes_straight() -> None:
 @given(st.lists(st.tuples(calm_crafts, states, controls), min_size=1, max_size=8))
 def test_a_batch_is_each_craft_alone(batch: list[tuple[Craft, State, Controls]]) -> None:
     fields = Craft.__dataclass_fields__
-    many = Craft(**{name: np.array([getattr(craft, name) for craft, _, _ in batch]) for name in fields})  # type: ignore[arg-type]
-    together = State(*np.array([state for _, state, _ in batch]).T)  # type: ignore[arg-type]
-    asked = Controls(*np.array([controls for _, _, controls in batch]).T)  # type: ignore[arg-type]
+    columns: dict[str, Any] = {name: np.array([getattr(craft, name) for craft, _, _ in batch]) for name in fields}
+    many = Craft(**columns)
+    together = State(*np.array([state for _, state, _ in batch]).T)
+    asked = Controls(*np.array([controls for _, _, controls in batch]).T)
     before = np.array(together)
     end, n = advance(together, asked, many, 0.01, Settings(0.001), np)
     assert n == 10

@@ -1,0 +1,140 @@
+"""The command as its user meets it: in a process of its own, in an empty folder."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from hovercraft_fmu.scenes import SCENES
+
+
+class Shell:
+    """An empty folder to type in."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", *arguments]
+        env = {**os.environ, "NO_COLOR": "1"}
+        return subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=120, env=env)
+
+    def ok(self, *arguments: str) -> str:
+        done = self.run(*arguments)
+        assert (done.returncode, done.stderr) == (0, "")
+        return done.stdout
+
+
+@pytest.fixture
+def shell(tmp_path: Path) -> Shell:
+    return Shell(tmp_path)
+
+
+def test_bare_command_helps(shell: Shell) -> None:
+    printed = shell.ok()
+    assert "hovercraft-fmu demo" in printed
+    assert all(command in printed for command in ("build", "simulate", "validate", "demo", "benchmark"))
+
+
+def test_demo(shell: Shell) -> None:
+    printed = shell.ok("demo")
+    assert printed.count("  ok    ") == 3
+    assert "FAILED" not in printed
+    assert "47.4 craft lengths" in printed
+    commands = [line.strip() for line in printed.splitlines() if line.startswith("  hovercraft-fmu ")]
+    assert len(commands) == 3
+    assert (shell.folder / "build" / "Hovercraft.fmu").exists()
+    assert (shell.folder / "build" / "demo" / "ice.csv").read_text().startswith('"time","thrust"')
+    with Image.open(shell.folder / "build" / "demo" / "ice.png") as picture:
+        assert picture.size == (1440, 810)
+        assert len(picture.convert("RGB").getcolors(maxcolors=100000) or []) > 50
+    for command in commands:
+        shell.ok(*command.split()[1:])
+
+
+def test_build_and_validate(shell: Shell) -> None:
+    assert shell.run("validate").returncode == 1
+    assert "Hovercraft.fmu" in shell.ok("build")
+    assert shell.ok("validate").count("  ok    ") == 3
+    assert shell.ok("validate", "build/Hovercraft.fmu", "build/Hovercraft.fmu").count("checking") == 2
+
+
+def test_validate_fails_loudly(shell: Shell) -> None:
+    """An FMU whose binary cannot be loaded, and whose description has an unknown unit."""
+    import zipfile
+
+    shell.ok("build")
+    with (
+        zipfile.ZipFile(shell.folder / "build" / "Hovercraft.fmu") as good,
+        zipfile.ZipFile(shell.folder / "bad.fmu", "w") as bad,
+    ):
+        for name in good.namelist():
+            content = good.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(b'unit="kg.m2"', b'unit="stone"')
+            bad.writestr(name, b"no library" if name.startswith("binaries") else content)
+    done = shell.run("validate", "bad.fmu")
+    assert done.returncode == 1
+    assert done.stdout.count("FAILED") == 2
+    assert 'The unit "stone"' in done.stdout
+    assert "problems found" in done.stderr
+
+
+def test_simulate_writes_what_is_asked_for(shell: Shell) -> None:
+    printed = shell.ok(
+        "simulate", "--scene", "turn", "--set", "mass=200", "--stop-time", "20", "--output", "a/turn.csv", "--plot",
+        "a/turn.png", "--communication-step", "0.5",
+    )  # fmt: skip
+    assert "20 s, 40 communication steps" in printed
+    assert len((shell.folder / "a" / "turn.csv").read_text().splitlines()) == 42
+    assert (shell.folder / "a" / "turn.png").stat().st_size > 10000
+
+
+def test_simulate_a_control_log(shell: Shell) -> None:
+    (shell.folder / "log.csv").write_text("time,thrust\n0,5\n3,5\n")
+    assert "3 s, 300 communication steps" in shell.ok("simulate", "--input", "log.csv", "--preset", "ice")
+
+
+def test_list_scenes(shell: Shell) -> None:
+    printed = shell.ok("simulate", "--list-scenes")
+    assert all(f"\n{name} " in printed for name in SCENES)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("simulate", "--scene", "nix"), "scene = 'nix': must be one of launch"),
+        (("simulate", "--set", "mass"), "--set mass: must be NAME=VALUE"),
+        (("simulate", "--set", "mass=-4"), "mass = -4.0: must be greater than 0"),
+        (("simulate", "--set", "nix=4"), "nix = 4: must be a variable that can be set"),
+        (("simulate", "--input", "nix.csv"), "nix.csv: No such file or directory"),
+        (("simulate", "--input", "nix.csv", "--scene", "turn"), "must not be given together"),
+        (("simulate", "nix.fmu"), "nix.fmu: no such FMU"),
+        (("simulate", "--preset", "moon"), "preset = 'moon': must be one of textbook, ice"),
+        (("simulate", "--stop-time", "soon"), "'soon' is not a valid float"),
+        (("simulate", "--frob",), "No such option"),
+        (("frob",), "No such command 'frob'"),
+        (("validate", "nix.fmu"), "nix.fmu: no such FMU"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_clear_line(shell: Shell, arguments: tuple[str, ...], message: str) -> None:
+    done = shell.run(*arguments)
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_without_matplotlib_a_picture_says_how_to_get_it(shell: Shell) -> None:
+    (shell.folder / "matplotlib.py").touch()  # hides the real one
+    done = shell.run("simulate", "--stop-time", "1", "--plot", "a.png")
+    assert done.returncode == 1
+    assert "pip install 'hovercraft-fmu[plot]'" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_benchmark_prints_its_ratios(shell: Shell) -> None:
+    printed = shell.ok("benchmark")
+    assert all(case in printed for case in ("reference loop, inline", "bare model", "FMU through fmpy"))

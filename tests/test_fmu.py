@@ -1,0 +1,265 @@
+"""The FMU as a host sees it, in processes of its own."""
+
+import json
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+
+from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES
+from hovercraft_fmu.model.dynamics import Controls, State
+from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.simulation import SimulationError, instantiated, plan, read_description, run_fmu, run_model
+from tests.conftest import Fresh
+
+COLUMNS = (*INPUTS, *STATES, *MOTION, *ACTION, "substeps")
+SIMULATE_ALL = """
+import json, sys, fmpy, numpy as np
+fmu, folder = sys.argv[1:]
+runs = json.load(open(folder + "/runs.json"))
+assert not [name for name in sys.modules if name.startswith("hovercraft_fmu")]
+for name, run in runs.items():
+    result = fmpy.simulate_fmu(fmu, input=np.load(f"{folder}/{name}.npy"), output=run.pop("output"), **run)
+    np.save(f"{folder}/{name}.result.npy", np.asarray(result))
+assert not [name for name in sys.modules if name.startswith("hovercraft_fmu")]
+print("absent" if __import__("importlib.util").util.find_spec("hovercraft_fmu") is None else "installed")
+"""
+
+
+def reference(name: str) -> int:
+    return BY_NAME[name].reference
+
+
+def write_runs(folder: Path) -> None:
+    """What a script needs to simulate every scene with fmpy alone."""
+    runs = {}
+    for name in SCENES:
+        run = plan(name)
+        np.save(folder / f"{name}.npy", run.signals)
+        runs[name] = {
+            "start_values": dict(run.start_values),
+            "start_time": run.start_time,
+            "stop_time": run.stop_time,
+            "output_interval": run.communication_step,
+            "output": COLUMNS,
+        }
+    (folder / "runs.json").write_text(json.dumps(runs))
+
+
+def assert_equal_to_the_model(folder: Path) -> None:
+    for name in SCENES:
+        result, expected = np.load(folder / f"{name}.result.npy"), run_model(plan(name))
+        assert set(result.dtype.names) == set(expected.names)
+        for column in expected.names:
+            assert np.array_equal(result[column], expected[column]), (name, column)
+
+
+def test_every_scene_equals_the_bare_model_to_the_bit(fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
+    write_runs(tmp_path)
+    assert fresh(SIMULATE_ALL, fmu, tmp_path).split() == ["installed"]
+    assert_equal_to_the_model(tmp_path)
+
+
+def test_the_same_where_neither_this_package_nor_pythonfmu_is_installed(
+    fmu: Path, fresh: Fresh, tmp_path: Path
+) -> None:
+    """All of this environment's packages but those two, linked into a folder of their own; no site-packages."""
+    packages = tmp_path / "packages"
+    packages.mkdir()
+    for folder in {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}:
+        for entry in Path(folder).iterdir():
+            if entry.is_dir() and not entry.name.startswith(("hovercraft_fmu", "pythonfmu")):
+                (packages / entry.name).symlink_to(entry)
+    write_runs(tmp_path)
+    env = {"PYTHONPATH": str(packages)}
+    assert fresh(SIMULATE_ALL, fmu, tmp_path, flags=("-S",), env=env).split() == ["absent"]
+    assert_equal_to_the_model(tmp_path)
+
+
+def test_the_slave_needs_the_standard_library_alone(fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(tmp_path)
+    code = """
+import sys
+sys.path.insert(0, sys.argv[1])
+module = __import__(open(sys.argv[1] + "/slavemodule.txt").read())
+slave = module.Hovercraft(instance_name="alone", resources=sys.argv[1])
+slave.setup_experiment(0.0, None, None)
+slave.enter_initialization_mode()
+slave.exit_initialization_mode()
+slave.set_real([0, 1], [8.0, 1.0])
+assert slave.do_step(0.0, 0.5)
+print(repr(slave.get_real([3, 4, 5, 6, 7, 8])))
+assert "numpy" not in sys.modules
+"""
+    printed = fresh(code, tmp_path / "resources", flags=("-I", "-S"))
+    from hovercraft_fmu.model.craft import Craft
+    from hovercraft_fmu.model.subcycling import advance
+
+    expected, _ = advance(State(), Controls(8.0, 1.0, 0.0), Craft(), 0.5)
+    assert printed.strip() == repr(list(expected))
+
+
+def test_two_builds_and_an_imported_package_run_their_own_code_in_one_process(fmu: Path, fresh: Fresh) -> None:
+    """A second FMU whose drag is doubled in its source, the first one, and this package, side by side."""
+    code = """
+import shutil, sys, tempfile
+from pathlib import Path
+import fmpy
+import hovercraft_fmu
+from hovercraft_fmu.fmu import package
+from hovercraft_fmu.simulation import plan, run_model
+
+changed = Path("changed")
+shutil.copytree(package.PACKAGE, changed)
+source = changed / "model" / "craft.py"
+source.write_text(source.read_text().replace("return 0.5 * self.air_density", "return 1.0 * self.air_density"))
+package.PACKAGE = changed
+second = package.build_fmu("Second.fmu")
+options = {"stop_time": 60.0, "output_interval": 0.1, "output": ["velocity.x"]}
+for _ in range(2):
+    one = fmpy.simulate_fmu(sys.argv[1], **options)["velocity.x"][-1]
+    two = fmpy.simulate_fmu(str(second), **options)["velocity.x"][-1]
+    bare = run_model(plan("launch"))["velocity.x"][-1]
+    assert one == bare
+    assert abs(two - bare / 2**0.5) < 1e-6, (two, bare)
+print("ok")
+"""
+    assert fresh(code, fmu).strip() == "ok"
+
+
+def test_fmutool_reports_nothing(fmu: Path) -> None:
+    command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", str(fmu), "-check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    printed = done.stdout + done.stderr
+    assert "compliant with FMI-2.0" in printed
+    assert "No semantic error" in printed
+    assert not [line for line in printed.splitlines() if line.startswith(("ERROR", "WARNING", "CRITICAL"))]
+
+
+def test_fmpy_validates(fmu: Path) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(fmu)) == []
+
+
+def test_what_is_inside(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        names = set(archive.namelist())
+        page = archive.read("documentation/index.html").decode()
+        icon = archive.read("model.png")
+    assert {
+        "modelDescription.xml",
+        "documentation/externalDependencies.txt",
+        "documentation/licenses/license.txt",
+        "documentation/licenses/pythonfmu.txt",
+        "binaries/linux64/Hovercraft.so",
+        "binaries/win64/Hovercraft.dll",
+    } <= names
+    assert icon.startswith(b"\x89PNG")
+    assert all(f"<code>{name}</code>" in page for name in BY_NAME)
+    assert "LD_PRELOAD" in page
+    assert not [name for name in names if "__pycache__" in name or name.startswith("/")]
+
+
+# ---- communication points, through the low-level interface
+
+
+@pytest.fixture
+def instance(fmu: Path) -> Iterator[Any]:
+    with instantiated(fmu, read_description(fmu), []) as (_, made):
+        yield made
+
+
+def start(instance: Any, time: float = 0.0) -> None:
+    instance.setupExperiment(startTime=time)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+
+
+def get(instance: Any, *names: str) -> list[float]:
+    return list(instance.getReal([reference(name) for name in names]))
+
+
+def test_outputs_belong_to_the_communication_point(instance: Any) -> None:
+    seen = ("applied.thrust", "applied.steering", "force.x", "moment", "acceleration.yaw")
+    start(instance)
+    # right after initialization: the start inputs
+    assert get(instance, *seen) == [5.0, 0.0, 5.0, 0.0, 0.0]
+    instance.setReal([reference("thrust"), reference("port_thruster")], [8.0, 1.0])
+    assert get(instance, *seen) == [5.0, 0.0, 5.0, 0.0, 0.0]
+    assert get(instance, "thrust", "port_thruster") == [8.0, 1.0]
+    instance.doStep(0.0, 0.1)
+    after = get(instance, *seen, *STATES)
+    assert after[:2] == [8.0, 3.0]
+    instance.setReal([reference("thrust"), reference("port_thruster")], [0.0, 0.0])
+    assert get(instance, *seen, *STATES) == after
+    instance.doStep(0.1, 0.1)
+    assert get(instance, *seen[:2]) == [0.0, 0.0]
+
+
+def test_start_values_are_seen_before_the_first_step(instance: Any) -> None:
+    instance.setReal([reference("length"), reference("velocity.x")], [30.0, 0.25])
+    instance.setupExperiment()
+    instance.enterInitializationMode()
+    instance.setReal([reference("pose.heading")], [np.pi / 2])
+    instance.exitInitializationMode()
+    assert get(instance, "projected_area", "speed") == [100.0, 0.25]
+    assert get(instance, "body.surge", "body.sway") == pytest.approx([0.0, -0.25], abs=1e-16)
+
+
+def test_substeps_are_counted(instance: Any) -> None:
+    start(instance)
+    assert instance.getInteger([reference("substeps")]) == [0]
+    instance.doStep(0.0, 0.25)
+    instance.doStep(0.25, 1e-13)
+    assert instance.getInteger([reference("substeps")]) == [251]
+
+
+def test_a_step_of_no_time_is_an_error(instance: Any) -> None:
+    start(instance)
+    with pytest.raises(fmpy.fmi1.FMICallException, match="fmi2DoStep failed"):
+        instance.doStep(0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("start_values", "message"),
+    [
+        ({"mass": -1.0}, "mass = -1.0: must be greater than 0"),
+        ({"air_density": float("nan")}, "air_density = nan: must be a finite number"),
+        ({"step_size": 0.0}, "step_size = 0.0 s: must be a finite number greater than 0"),
+        ({"integrator": 99}, "integrator = 99: must be one of 1 (semi_implicit_euler)"),
+        ({"thrust_min": 20.0}, "thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"),
+        ({"thrust": float("inf")}, "thrust = inf: must be a finite number"),
+        ({"velocity.x": 1e200}, "velocity.x = nan after 0.0 s: must stay a finite number"),
+        ({"step_size": 1e-12}, "must not need more than 10^9 sub-steps of step_size = 1e-12 s"),
+    ],
+)
+def test_a_fault_raises_and_says_what_is_wrong(fmu: Path, start_values: dict[str, float], message: str) -> None:
+    with pytest.raises(SimulationError) as caught:
+        run_fmu(plan("launch", start_values=start_values), fmu)
+    assert message in str(caught.value)
+
+
+def test_state_can_be_saved_and_restored(instance: Any) -> None:
+    start(instance)
+    instance.setReal([reference("port_thruster")], [1.0])
+    instance.doStep(0.0, 0.5)
+    saved = instance.getFMUstate()
+    bytes_saved = instance.serializeFMUstate(saved)
+    instance.doStep(0.5, 0.5)
+    first = get(instance, *STATES, *MOTION, *ACTION)
+    instance.setFMUstate(saved)
+    instance.doStep(0.5, 0.5)
+    assert get(instance, *STATES, *MOTION, *ACTION) == first
+    instance.setFMUstate(instance.deSerializeFMUstate(bytes_saved))
+    instance.doStep(0.5, 0.5)
+    assert get(instance, *STATES, *MOTION, *ACTION) == first
+    instance.freeFMUstate(saved)

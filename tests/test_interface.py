@@ -1,0 +1,152 @@
+"""The promises of the interface: names, units and starts exactly so, and a complete description."""
+
+import re
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+from lxml import etree
+
+from hovercraft_fmu.fmu.interface import ACTION, INPUTS, MOTION, STATES, UNITS, VARIABLES
+from hovercraft_fmu.model.integrators import INTEGRATORS
+
+# name: (causality, variability, initial, unit, start)
+TABLE = {
+    "thrust": ("input", "continuous", None, "N", "5.0"),
+    "port_thruster": ("input", "continuous", None, "1", "0.0"),
+    "starboard_thruster": ("input", "continuous", None, "1", "0.0"),
+    "pose.x": ("output", "continuous", "exact", "m", "0.0"),
+    "pose.y": ("output", "continuous", "exact", "m", "0.0"),
+    "pose.heading": ("output", "continuous", "exact", "rad", "0.0"),
+    "velocity.x": ("output", "continuous", "exact", "m/s", "0.0"),
+    "velocity.y": ("output", "continuous", "exact", "m/s", "0.0"),
+    "velocity.yaw_rate": ("output", "continuous", "exact", "rad/s", "0.0"),
+    "body.surge": ("output", "continuous", "calculated", "m/s", None),
+    "body.sway": ("output", "continuous", "calculated", "m/s", None),
+    "speed": ("output", "continuous", "calculated", "m/s", None),
+    "force.x": ("local", "continuous", "calculated", "N", None),
+    "force.y": ("local", "continuous", "calculated", "N", None),
+    "moment": ("local", "continuous", "calculated", "N.m", None),
+    "acceleration.x": ("local", "continuous", "calculated", "m/s2", None),
+    "acceleration.y": ("local", "continuous", "calculated", "m/s2", None),
+    "acceleration.yaw": ("local", "continuous", "calculated", "rad/s2", None),
+    "applied.thrust": ("local", "continuous", "calculated", "N", None),
+    "applied.steering": ("local", "continuous", "calculated", "N", None),
+    "substeps": ("local", "discrete", "calculated", None, None),
+    "mass": ("parameter", "fixed", "exact", "kg", "100.0"),
+    "inertia": ("parameter", "fixed", "exact", "kg.m2", "500.0"),
+    "length": ("parameter", "fixed", "exact", "m", "20.0"),
+    "width": ("parameter", "fixed", "exact", "m", "10.0"),
+    "height": ("parameter", "fixed", "exact", "m", "5.0"),
+    "drag_coefficient": ("parameter", "tunable", "exact", "1", "1.25"),
+    "air_density": ("parameter", "tunable", "exact", "kg/m3", "1.225"),
+    "drag_center_fraction": ("parameter", "fixed", "exact", "1", "-0.25"),
+    "projected_area": ("calculatedParameter", "fixed", "calculated", "m2", None),
+    "steering_force": ("parameter", "tunable", "exact", "N", "3.0"),
+    "thrust_min": ("parameter", "tunable", "exact", "N", "0.0"),
+    "thrust_max": ("parameter", "tunable", "exact", "N", "10.0"),
+    "step_size": ("parameter", "fixed", "exact", "s", "0.001"),
+    "integrator": ("parameter", "fixed", "exact", None, "1"),
+}
+DERIVATIVES = {
+    "velocity.x": "pose.x",
+    "velocity.y": "pose.y",
+    "velocity.yaw_rate": "pose.heading",
+    "acceleration.x": "velocity.x",
+    "acceleration.y": "velocity.y",
+    "acceleration.yaw": "velocity.yaw_rate",
+}
+
+
+@pytest.fixture(scope="module")
+def description(fmu: Path) -> Any:
+    return fmpy.read_model_description(fmu)
+
+
+@pytest.fixture(scope="module")
+def xml(fmu: Path) -> Any:
+    with zipfile.ZipFile(fmu) as archive:
+        return etree.fromstring(archive.read("modelDescription.xml"))
+
+
+def test_the_table(description: Any) -> None:
+    found = {
+        v.name: (v.causality, v.variability, v.initial if v.causality != "input" else None, v.unit, v.start)
+        for v in description.modelVariables
+    }
+    assert found == TABLE
+    assert [v.name for v in description.modelVariables] == [v.name for v in VARIABLES]
+
+
+def test_value_references_are_stable(description: Any) -> None:
+    """They may only be added to within a major version."""
+    assert {v.name: v.valueReference for v in description.modelVariables} == {n: i for i, n in enumerate(TABLE)}
+
+
+def test_derivatives_limits_and_descriptions(description: Any) -> None:
+    by_name = {v.name: v for v in description.modelVariables}
+    assert {v.name: v.derivative.name for v in description.modelVariables if v.derivative} == DERIVATIVES
+    assert all(v.description for v in description.modelVariables)
+    assert (by_name["thrust"].min, by_name["thrust"].max) == (None, None)
+    for name in ("port_thruster", "starboard_thruster"):
+        assert (float(by_name[name].min), float(by_name[name].max)) == (0.0, 1.0)
+    fraction = by_name["drag_center_fraction"]
+    assert (float(fraction.min), float(fraction.max)) == (-0.5, 0.5)
+
+
+def test_units(description: Any, xml: Any) -> None:
+    assert {u.name: u.baseUnit is not None for u in description.unitDefinitions} == dict.fromkeys(UNITS, True)
+    assert xml.xpath("//Unit[@name='N']/BaseUnit/@*") == ["1", "1", "-2"]
+    for name, degrees in (("rad", "deg"), ("rad/s", "deg/s")):
+        (display,) = xml.xpath(f"//Unit[@name='{name}']/DisplayUnit")
+        assert display.get("name") == degrees
+        assert float(display.get("factor")) == 180.0 / 3.141592653589793
+    assert xml.xpath("//ScalarVariable[@name='pose.heading']/Real/@displayUnit") == ["deg"]
+    assert xml.xpath("//ScalarVariable[@name='velocity.yaw_rate']/Real/@displayUnit") == ["deg/s"]
+    assert all(node.get("declaredType") for node in xml.xpath("//ScalarVariable/Real"))
+
+
+def test_integrator_is_an_enumeration_with_described_items(xml: Any) -> None:
+    assert xml.xpath("//ScalarVariable[@name='integrator']/Enumeration/@declaredType") == ["Integrator"]
+    items = xml.xpath("//SimpleType[@name='Integrator']/Enumeration/Item")
+    assert [(item.get("name"), item.get("value")) for item in items] == [
+        (method.name, str(number)) for number, method in enumerate(INTEGRATORS, 1)
+    ]
+    assert all(item.get("description") for item in items)
+
+
+def test_model_structure(description: Any) -> None:
+    outputs = {u.variable.name: u.dependencies for u in description.outputs}
+    assert outputs == {name: [] for name in (*STATES, *MOTION)}
+    unknowns = {u.variable.name: {v.name for v in u.dependencies} for u in description.initialUnknowns}
+    assert unknowns == {
+        "body.surge": {"pose.heading", "velocity.x", "velocity.y"},
+        "body.sway": {"pose.heading", "velocity.x", "velocity.y"},
+        "speed": {"velocity.x", "velocity.y"},
+        "projected_area": {"length", "width", "height"},
+    }
+
+
+def test_the_head_of_the_description(description: Any, xml: Any) -> None:
+    assert re.fullmatch(r"\{[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", description.guid)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", description.generationDateAndTime)
+    assert all(xml.get(name) for name in ("author", "license", "version", "copyright", "description"))
+    assert xml.get("variableNamingConvention") == "structured"
+    experiment = xml.find("DefaultExperiment")
+    assert dict(experiment.attrib) == {"startTime": "0.0", "stopTime": "60.0", "stepSize": "0.01"}
+    assert xml.xpath("count(//LogCategories/Category)") >= 4
+    capabilities = dict(xml.find("CoSimulation").attrib)
+    truths = {name for name, value in capabilities.items() if value == "true"}
+    assert truths == {
+        "canHandleVariableCommunicationStepSize",
+        "canNotUseMemoryManagementFunctions",
+        "canGetAndSetFMUstate",
+        "canSerializeFMUstate",
+    }
+
+
+def test_the_groups_of_the_table_cover_it() -> None:
+    names = [v.name for v in VARIABLES if v.variability == "continuous"]
+    assert names == [*INPUTS, *STATES, *MOTION, *ACTION]

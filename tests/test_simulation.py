@@ -1,0 +1,137 @@
+"""Runs from a script: what goes in is checked, what comes out is whole."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hovercraft_fmu
+from hovercraft_fmu.scenes import SCENES, signals
+from hovercraft_fmu.simulation import SimulationError, plain, plan, read_inputs, run_fmu
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def test_three_lines_in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = hovercraft_fmu.simulate("launch")
+    assert (tmp_path / "build" / "Hovercraft.fmu").exists()
+    assert result["time"][-1] == pytest.approx(60.0)
+    assert result["velocity.x"][-1] == pytest.approx(0.29508, abs=5e-6)
+
+
+def test_inputs_of_ones_own(fmu: Path, tmp_path: Path) -> None:
+    log = write(tmp_path / "log.csv", "time,thrust\n0,2\n4,2\n4,6\n10,6\n")
+    result = hovercraft_fmu.simulate(log, fmu)
+    assert result["time"][[0, -1]] == pytest.approx([0.0, 10.0])
+    assert len(result["time"]) == 1001
+    assert result["thrust"][result["time"] < 3.99] == pytest.approx(2.0)
+    assert result["thrust"][result["time"] > 4.01] == pytest.approx(6.0)
+    assert not result["port_thruster"].any()
+    array = signals([(0.0, 2.0, 0.0, 0.0), (4.0, 2.0, 0.0, 0.0), (4.0, 6.0, 0.0, 0.0), (10.0, 6.0, 0.0, 0.0)])
+    assert np.array_equal(hovercraft_fmu.simulate(array, fmu).data, result.data)
+
+
+def test_what_is_set_comes_after_the_preset(fmu: Path) -> None:
+    run = plan("ice", start_values={"air_density": "0.5", "integrator": "semi_implicit_euler"})
+    assert (run.craft.air_density, run.settings.integrator.name) == (0.5, "semi_implicit_euler")
+    assert plan("launch", preset="ice").craft.air_density == 0.0023769
+    result = hovercraft_fmu.simulate("launch", fmu, start_values={"pose.x": 7.0}, stop_time=0.5)
+    assert result["pose.x"][0] == 7.0
+
+
+def test_the_start_need_not_be_zero(fmu: Path) -> None:
+    late = hovercraft_fmu.simulate("launch", fmu, start_time=1000.0, stop_time=1005.0)
+    early = hovercraft_fmu.simulate("launch", fmu, stop_time=5.0)
+    assert late["time"][0] == 1000.0
+    assert late["velocity.x"] == pytest.approx(early["velocity.x"], rel=1e-12)
+
+
+def test_progress_is_told(fmu: Path) -> None:
+    times: list[float] = []
+    hovercraft_fmu.simulate("launch", fmu, stop_time=1.0, progress=times.append)
+    assert times == pytest.approx(np.arange(0.1, 1.05, 0.1))
+
+
+def test_a_csv_file_holds_every_bit(fmu: Path, tmp_path: Path) -> None:
+    import fmpy.util
+
+    result = hovercraft_fmu.simulate("turn", fmu, stop_time=15.0)
+    back = fmpy.util.read_csv(result.write_csv(tmp_path / "new" / "turn.csv"))
+    assert back.dtype.names == result.names
+    assert all(np.array_equal(back[name], result[name]) for name in result.names)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "must be a CSV file"),
+        ("time,thrust\n", "must be a CSV file"),
+        ("time,thrust\n0,1\n1\n", "must be a CSV file"),
+        ("time,thrust\n0,five\n", "must be a CSV file"),
+        ("thrust,time\n0,1\n", "the first column must be 'time'"),
+        ("time,mass\n0,1\n", "column 'mass' must be an input: thrust, port_thruster, starboard_thruster"),
+        ("time,thrust\n0,1\n1,nan\n", "thrust = nan in row 2: must be a finite number"),
+        ("time,thrust\n0,1\n2,1\n1,1\n", "time = 1.0 in row 3: must not go back"),
+    ],
+)
+def test_bad_control_logs(tmp_path: Path, text: str, message: str) -> None:
+    path = write(tmp_path / "bad.csv", text)
+    with pytest.raises(ValueError, match=r"bad\.csv") as caught:
+        read_inputs(path)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"preset": "moon"}, "preset = 'moon'"),
+        ({"start_values": {"foo": 1.0}}, "foo = 1.0: must be a variable that can be set"),
+        ({"start_values": {"speed": 1.0}}, "speed = 1.0: must be a variable that can be set"),
+        ({"start_values": {"mass": "heavy"}}, "mass = 'heavy': must be a number"),
+        ({"start_values": {"integrator": "magic"}}, "integrator = 'magic': must be one of"),
+        ({"stop_time": 0.0}, "stop_time = 0.0 s: must be after start_time = 0.0 s"),
+        ({"stop_time": math.nan}, "stop_time = nan s: must be a finite number"),
+        ({"communication_step": 0.0}, "communication_step = 0.0 s: must be greater than 0"),
+    ],
+)
+def test_bad_options(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 - the message is compared below
+        plan("launch", **options)
+    assert message in str(caught.value)
+
+
+def test_bad_files(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such FMU"):
+        run_fmu(plan("launch"), tmp_path / "nix.fmu")
+    with pytest.raises(ValueError, match="must be an FMU"):
+        run_fmu(plan("launch"), write(tmp_path / "text.fmu", "not an archive"))
+    with pytest.raises(FileNotFoundError):
+        plan(tmp_path / "nix.csv")
+    with pytest.raises(ValueError, match="column = 'nix': must be one of time, thrust"):
+        hovercraft_fmu.Result(np.zeros(1, dtype=[("time", float), ("thrust", float)]), plan("launch"))["nix"]
+
+
+def test_a_run_that_stops_short_raises(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import fmpy
+
+    whole = fmpy.simulate_fmu
+    monkeypatch.setattr(fmpy, "simulate_fmu", lambda *args, **options: whole(*args, timeout=0.0, **options))
+    with pytest.raises(SimulationError, match=r"ended at .*: must reach stop_time = 60\.0 s"):
+        run_fmu(plan("launch"), fmu)
+
+
+def test_the_wrappers_messages_read_plainly() -> None:
+    assert plain("Fatal py exception\nValueError('mass = -1.0: must be \\'x\\'')") == "mass = -1.0: must be 'x'"
+    assert plain("something else") == "something else"
+
+
+def test_every_scene_can_be_planned() -> None:
+    for name, scene in SCENES.items():
+        run = plan(name)
+        assert (run.title, run.stop_time, run.craft, run.start) == (name, scene.stop_time, scene.craft, scene.start)
