@@ -14,9 +14,9 @@ from pathlib import Path
 import pythonfmu
 from pythonfmu.builder import FmuBuilder
 
-from ..view.icon import icon_png
 from .description import MODEL_NAME
 from .document import index_html
+from .icon import icon_png
 
 PACKAGE = Path(__file__).parent.parent
 TRAVELS = ("_version.py", "model/*.py", "fmu/__init__.py", "fmu/interface.py", "fmu/description.py", "fmu/slave.py")

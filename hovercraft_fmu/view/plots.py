@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..fmu.icon import outline
 from ..simulation import Result
-from .outline import outline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

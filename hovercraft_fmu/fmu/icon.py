@@ -1,4 +1,4 @@
-"""The icon of the FMU: the craft from above, on a sea of its own."""
+"""The icon of the FMU: the craft from above; and the outline that every picture draws it with."""
 
 import io
 import math
@@ -6,13 +6,28 @@ import math
 from PIL import Image, ImageDraw
 
 from ..model.craft import Craft
-from .outline import outline
 
 SIZE = 128
 FINE = 8
 """Drawn so many times larger, and then made smaller: smooth edges."""
 HEADING = math.radians(-35.0)
 SEA, WAKE, HULL, EDGE, JET = "#0b4f6c", "#4fa3c7", "#fbfbff", "#01161e", "#f6ae2d"
+
+
+def outline(craft: Craft) -> list[tuple[float, float]]:
+    """The craft as five lines, around the centre of gravity, bow to the right.
+
+    The closed outline in the body frame [m]: the box with a bow tip ahead of it; the first point is the last one, too.
+    """
+    length, width = craft.length, craft.width
+    return [
+        (0.75 * length, 0.0),
+        (0.5 * length, 0.5 * width),
+        (-0.5 * length, 0.5 * width),
+        (-0.5 * length, -0.5 * width),
+        (0.5 * length, -0.5 * width),
+        (0.75 * length, 0.0),
+    ]
 
 
 def icon_png() -> bytes:
