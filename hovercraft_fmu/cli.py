@@ -212,6 +212,8 @@ def _print_result(result: Result) -> None:
     for name, text in rows.items():
         table.add_row(name, text)
     OUTPUT.print(table)
+    for warning in result.warnings:
+        OUTPUT.print(f"warning: {warning}", markup=False)
 
 
 def _write(result: Result, output: Path | None, plot: Path | None) -> None:

@@ -91,6 +91,8 @@ class Result:
 
     data: NDArray[np.void]
     run: Run
+    warnings: tuple[str, ...] = ()
+    """What the FMU said that did not end the run."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self.names:
@@ -322,7 +324,7 @@ def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = N
             raise SimulationError("; ".join(messages) or str(error)) from error
     if not isclose(data["time"][-1], run.stop_time):
         raise SimulationError(f"the run ended at {data['time'][-1]!r} s: must reach stop_time = {run.stop_time!r} s")
-    return Result(np.asarray(data), run)
+    return Result(np.asarray(data), run, tuple(messages))
 
 
 def read_description(path: Path, validate: bool = True) -> Any:

@@ -18,6 +18,16 @@ SUBSTEPS_MAX = 2147483647
 """The largest FMI Integer: the counter of sub-steps stops there."""
 
 
+INPUT_HELD, COUNTER_STOPPED = 1, 2
+WARNINGS: Mapping[int, str] = MappingProxyType(
+    {
+        INPUT_HELD: "an input was outside its limits and was held at the limit",
+        COUNTER_STOPPED: "the counter of sub-steps reached its end and stopped",
+    }
+)
+"""The bits of the variable `warnings`; each is logged when it is first set."""
+
+
 @dataclass(frozen=True)
 class Unit:
     """A unit as FMI wants it: exponents of the SI base units, and what displays show instead."""
@@ -161,6 +171,10 @@ VARIABLES: tuple[Variable, ...] = (
     Variable(34, "integrator", "parameter", "fixed", None, 1,
              "The method that carries the state over a sub-step", kind="Enumeration",
              minimum=1, maximum=len(INTEGRATORS)),
+    # -- added later: value references only grow
+    Variable(35, "warnings", "local", "discrete", None, None,
+             "Sum of the warnings since initialization: " + "; ".join(f"{b}: {t}" for b, t in WARNINGS.items()),
+             kind="Integer", minimum=0, maximum=sum(WARNINGS)),
 )  # fmt: skip
 
 BY_NAME: Mapping[str, Variable] = MappingProxyType({variable.name: variable for variable in VARIABLES})

@@ -19,7 +19,15 @@ from .document import index_html
 from .icon import icon_png
 
 PACKAGE = Path(__file__).parent.parent
-TRAVELS = ("_version.py", "model/*.py", "fmu/__init__.py", "fmu/interface.py", "fmu/description.py", "fmu/slave.py")
+TRAVELS = (
+    "_version.py",
+    "model/*.py",
+    "fmu/__init__.py",
+    "fmu/interface.py",
+    "fmu/description.py",
+    "fmu/slave.py",
+    "fmu/wrapper.py",
+)
 """What of this package goes into the FMU, as patterns."""
 STATIC = Path(__file__).parent / "documentation"
 ENTRY_SCRIPT = '''\
@@ -83,7 +91,7 @@ def _archive() -> bytes:
                 project_files=[work / package],
                 documentation_folder=work / "documentation",
             )
-        return _repacked(fmu, icon)
+        return _repacked(fmu, package, icon)
 
 
 def _traveling() -> list[Path]:
@@ -138,11 +146,14 @@ def _imports_undone() -> Iterator[None]:
                 del sys.modules[name]
 
 
-def _repacked(fmu: Path, icon: bytes) -> bytes:
+def _repacked(fmu: Path, package: str, icon: bytes) -> bytes:
     """The archive in sorted order, without the times and permissions of the files it was made from."""
     with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     files["model.png"] = icon
+    # pythonfmu, too, gets a name of its own: a host may have imported another version of it
+    moved = f"resources/{package}/pythonfmu/"
+    files = {name.replace("resources/pythonfmu/", moved, 1): content for name, content in files.items()}
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in sorted(files):

@@ -1,36 +1,37 @@
 """The PythonFMU slave: life cycle, variables, state. It trusts nothing that comes from the host, and checks it once."""
 
-import ctypes
-import functools
 import hashlib
 import json
 import math
-from collections.abc import Callable
 from enum import Enum
-from typing import Any, ClassVar, Concatenate, NoReturn, ParamSpec, TypeVar, cast
+from typing import Any, ClassVar, NoReturn
 from xml.etree.ElementTree import Element
 
-from pythonfmu.fmi2slave import Fmi2Slave
-
 from ..model.craft import Craft, check_parameter
-from ..model.dynamics import Controls, State
+from ..model.dynamics import Controls, State, saturate
 from ..model.integrators import integrator
 from ..model.subcycling import NonFiniteError, Settings, advance, check_step_size
 from .description import model_description
 from .interface import (
     ACTION,
     BY_NAME,
+    COUNTER_STOPPED,
     CRAFT_PARAMETERS,
+    INPUT_HELD,
     INPUTS,
     MOTION,
     STATES,
     SUBSTEPS_MAX,
     VARIABLES,
+    WARNINGS,
     Variable,
     observe_action,
     observe_motion,
 )
+from .wrapper import Fmi2Status, WrappedSlave, called_by_wrapper
 
+HELD = 1e-9
+"""Relative to the limit (at least 1): an input beyond it by less is a rounding of the host's interpolation."""
 SAME_TIME = 1e-9
 """Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step."""
 
@@ -46,14 +47,12 @@ ACTION_SET = frozenset(ACTION_REFERENCES)
 STEP_SIZE = BY_NAME["step_size"].reference
 INTEGRATOR = BY_NAME["integrator"].reference
 SUBSTEPS = BY_NAME["substeps"].reference
+WARNED = BY_NAME["warnings"].reference
 PROJECTED_AREA = BY_NAME["projected_area"].reference
 KEPT_REALS = tuple(v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES)
 """What a host sets and the slave keeps as it was set: inputs and parameters."""
 DIGEST_SIZE = 64
 """Bytes of the hexadecimal SHA-256 ahead of a serialized state."""
-
-P = ParamSpec("P")
-R = TypeVar("R")
 
 
 class Phase(Enum):
@@ -73,26 +72,7 @@ SETTABLE = {
 }
 
 
-def called_by_wrapper(
-    method: Callable[Concatenate["HovercraftSlave", P], R],
-) -> Callable[Concatenate["HovercraftSlave", P], R]:
-    """A method that pythonfmu's wrapper calls; an exception leaves it in a shape that the wrapper survives.
-
-    The three methods that are called at every communication point do the same without the call in between.
-    """
-
-    @functools.wraps(method)
-    def call(self: "HovercraftSlave", *args: P.args, **kwargs: P.kwargs) -> R:
-        try:
-            return method(self, *args, **kwargs)
-        except Exception:
-            self._outlive_exception()
-            raise
-
-    return cast(Callable[Concatenate["HovercraftSlave", P], R], call)
-
-
-class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no types
+class HovercraftSlave(WrappedSlave):
     """The hovercraft behind the FMI functions of pythonfmu's wrapper.
 
     Variables are not registered with pythonfmu: its way of reading and writing them costs more than a sub-step, and
@@ -157,12 +137,16 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
                 self._refuse_motion(error)
             self._state, self._controls, self._craft, self._tuned = state, controls, craft, False
             self._time = current_time + step_size
-            count = self._integers[SUBSTEPS] + n
-            self._integers[SUBSTEPS] = count if count < SUBSTEPS_MAX else SUBSTEPS_MAX
+            self._integers[SUBSTEPS] += n
             self._stale = True
+            if self._integers[SUBSTEPS] > SUBSTEPS_MAX:
+                self._stop_counter()
+            thrust, port, starboard = controls
+            if not (craft.thrust_min <= thrust <= craft.thrust_max and 0.0 <= port <= 1.0 and 0.0 <= starboard <= 1.0):
+                self._warn_of_held_inputs()
             return True
         except Exception:
-            self._outlive_exception()
+            self.outlive_exception()
             raise
 
     @called_by_wrapper
@@ -170,16 +154,21 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
         self._require("fmi2Terminate", Phase.STEPPING)
         self._phase = Phase.TERMINATED
 
-    def _outlive_exception(self) -> None:
-        """To be called before an exception leaves for pythonfmu's wrapper.
+    def _stop_counter(self) -> None:
+        self._integers[SUBSTEPS] = SUBSTEPS_MAX
+        self._warn(COUNTER_STOPPED, f"substeps = {SUBSTEPS_MAX}: {WARNINGS[COUNTER_STOPPED]}")
 
-        On every exception the wrapper gives up its references to the class, the instance and the log queue, and again
-        when the instance is freed: one reference more to each of them balances that. And a message that is still
-        queued would turn the text of the exception into 'unknown error'.
-        """
-        self.log_queue.clear()
-        for kept in (type(self), self, self.log_queue):
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+    def _warn_of_held_inputs(self) -> None:
+        held = saturate(self._controls, self._craft)
+        for name, value, limit in zip(INPUTS, self._controls, held, strict=True):
+            if abs(value - limit) > HELD * max(1.0, abs(limit)):
+                self._warn(INPUT_HELD, f"{name} = {value!r}: is outside its limits and is held at {limit!r}")
+
+    def _warn(self, bit: int, message: str) -> None:
+        """Set the bit and log the message, unless the bit is set already. Only where no exception can follow."""
+        if not self._integers[WARNED] & bit:
+            self._integers[WARNED] |= bit
+            self.log(f"{message} (said once)", Fmi2Status.warning)
 
     def _require(self, call: str, phase: Phase) -> None:
         if self._phase is not phase:
@@ -208,7 +197,7 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
             except KeyError as error:
                 raise _unknown("Real", error.args[0]) from None
         except Exception:
-            self._outlive_exception()
+            self.outlive_exception()
             raise
 
     @called_by_wrapper
@@ -242,7 +231,7 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
             self._reals.update(zip(vrs, values, strict=True))
             self._after_set(vrs)
         except Exception:
-            self._outlive_exception()
+            self.outlive_exception()
             raise
 
     @called_by_wrapper
@@ -334,8 +323,7 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
 
     @called_by_wrapper
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if state["build"] != self.build:
-            raise ValueError(f"FMU state of build {state['build']!r}: must be a state of this build, {self.build!r}")
+        self._check_build(state)
         self._phase = Phase[state["phase"]]
         self._time = state["time"]
         self._reals.update(zip(KEPT_REALS, state["reals"], strict=True))
@@ -357,13 +345,23 @@ class HovercraftSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no type
         text = json.dumps(state).encode()
         return hashlib.sha256(text).hexdigest().encode() + text
 
-    @staticmethod
-    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+    @classmethod
+    def _fmu_state_from_bytes(cls, state: bytes) -> dict[str, Any]:
         digest, text = state[:DIGEST_SIZE], state[DIGEST_SIZE:]
-        if hashlib.sha256(text).hexdigest().encode() != digest:
-            raise ValueError(f"serialized FMU state of {len(state)} bytes: must be complete and unchanged")
-        restored: dict[str, Any] = json.loads(text)
+        try:
+            if hashlib.sha256(text).hexdigest().encode() != digest:
+                raise ValueError(f"serialized FMU state of {len(state)} bytes: must be complete and unchanged")
+            restored: dict[str, Any] = json.loads(text)
+            cls._check_build(restored)
+        except Exception:
+            cls.outlive_exception_of_class()
+            raise
         return restored
+
+    @classmethod
+    def _check_build(cls, state: dict[str, Any]) -> None:
+        if state["build"] != cls.build:
+            raise ValueError(f"FMU state of build {state['build']}: must be a state of this build, {cls.build}")
 
     # ---- description
 

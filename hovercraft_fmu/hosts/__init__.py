@@ -1,0 +1,215 @@
+"""The FMU in hosts that others wrote: each drives it over the same steps, and must give the bits that fmpy gives."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from importlib import metadata, util
+from pathlib import Path
+from typing import NamedTuple
+
+import fmpy
+
+from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
+
+COMMUNICATION_STEP = 0.1
+"""s"""
+CONTROLS = [(10.0, 0.0, 0.0)] * 5 + [(10.0, 1.0, 0.0)] * 10 + [(2.5, 0.0, 0.25)] * 10
+"""One row a communication step, in the order of INPUTS."""
+OUTPUTS = tuple(variable.name for variable in VARIABLES if variable.causality == "output")
+INPUT_REFERENCES = [BY_NAME[name].reference for name in INPUTS]
+OUTPUT_REFERENCES = [BY_NAME[name].reference for name in OUTPUTS]
+COMPILERS = ("cc", "gcc", "clang")
+
+
+class HostError(RuntimeError):
+    """A host that could not run the FMU; the message is the host's own."""
+
+
+class Host(NamedTuple):
+    """A host: how it is asked for its version, and what keeps it from running here ('' where nothing does)."""
+
+    name: str
+    version: Callable[[], str]
+    missing: Callable[[], str]
+
+
+def _package(name: str) -> Host:
+    def missing() -> str:
+        return "" if util.find_spec(name) else f"not installed: pip install {name.replace('_', '-')}"
+
+    return Host(name, lambda: metadata.version(name), missing)
+
+
+def compiler() -> str | None:
+    """The C compiler of this machine."""
+    return next((name for name in COMPILERS if shutil.which(name)), None)
+
+
+def python_library() -> str | None:
+    """The name of a Python library that the loader finds, 'libpython3.11.so.1.0', for LD_PRELOAD."""
+    if not shutil.which("ldconfig"):
+        return None
+    printed = subprocess.run(["ldconfig", "-p"], capture_output=True, text=True, check=False).stdout
+    found = re.findall(r"^\s*(libpython3\.(\d+)\.so\.1\.0) .*x86-64", printed, re.MULTILINE)
+    usable = [(int(minor), name) for name, minor in found if int(minor) >= 10]
+    return max(usable)[1] if usable else None
+
+
+def _missing_for_c() -> str:
+    if not compiler():
+        return f"no C compiler ({', '.join(COMPILERS)})"
+    return "" if python_library() else "no shared library of Python (Debian: apt-get install libpython3-dev)"
+
+
+HOSTS: Mapping[str, Host] = {
+    "fmpy": _package("fmpy"),
+    "libcosimpy": _package("libcosimpy"),
+    "ecospy": _package("ecospy"),
+    "fmucontainer": Host("fmucontainer", lambda: metadata.version("fmu_manipulation_toolbox"),
+                         _package("fmu_manipulation_toolbox").missing),
+    "C": Host("C", lambda: f"LD_PRELOAD={python_library()}", _missing_for_c),
+}  # fmt: skip
+
+
+def run_in(host: str, fmu: Path) -> list[list[float]]:
+    """Drive the FMU over CONTROLS in a process of its own; a row of OUTPUTS a communication step.
+
+    Raises:
+        HostError: the host failed; the last of what it printed.
+    """
+    command = [sys.executable, "-m", "hovercraft_fmu.hosts", host, str(fmu.absolute())]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    if done.returncode != 0:
+        raise HostError(f"exit status {done.returncode}: {done.stderr.strip()[-500:]}")
+    rows: list[list[float]] = json.loads(done.stdout.splitlines()[-1])
+    return rows
+
+
+# ---- what runs in the process of its own
+
+
+def run_fmpy(fmu: Path) -> list[list[float]]:
+    """Through fmpy's low-level interface."""
+    from ..simulation import instantiated, read_description
+
+    with instantiated(fmu, read_description(fmu), []) as (_, instance):
+        instance.setupExperiment()
+        instance.enterInitializationMode()
+        instance.exitInitializationMode()
+        rows = []
+        for k, controls in enumerate(CONTROLS):
+            instance.setReal(INPUT_REFERENCES, controls)
+            instance.doStep(k * COMMUNICATION_STEP, COMMUNICATION_STEP)
+            rows.append(list(instance.getReal(OUTPUT_REFERENCES)))
+        return rows
+
+
+def run_libcosimpy(fmu: Path) -> list[list[float]]:
+    """libcosim, the co-simulation library of the Open Simulation Platform."""
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    log_output_level(CosimLogLevel.ERROR)
+    execution = CosimExecution.from_step_size(round(COMMUNICATION_STEP * 1e9))  # ns
+    craft = execution.add_local_slave(CosimLocalSlave(fmu_path=str(fmu), instance_name="craft"))
+    manipulator, observer = CosimManipulator.create_override(), CosimObserver.create_last_value()
+    if not (execution.add_manipulator(manipulator) and execution.add_observer(observer)):
+        raise HostError("libcosimpy: no manipulator or observer")
+    rows = []
+    for controls in CONTROLS:
+        manipulator.slave_real_values(craft, INPUT_REFERENCES, list(controls))
+        if not execution.step():
+            raise HostError("libcosimpy: the step failed")
+        rows.append(list(observer.last_real_values(craft, OUTPUT_REFERENCES)))
+    return rows
+
+
+def run_ecospy(fmu: Path) -> list[list[float]]:
+    """Ecos; its library needs the one in the package tbb, which must be loaded first."""
+    import ctypes
+
+    tbb = next(file for file in metadata.files("tbb") or [] if file.name == "libtbb.so.12")
+    ctypes.CDLL(str(tbb.locate()), ctypes.RTLD_GLOBAL)
+    from ecospy import EcosSimulation, EcosSimulationStructure
+
+    structure = EcosSimulationStructure()
+    structure.add_model("craft", str(fmu))
+    rows = []
+    with EcosSimulation(structure=structure, step_size=COMMUNICATION_STEP) as simulation:
+        simulation.init()
+        for controls in CONTROLS:
+            for name, value in zip(INPUTS, controls, strict=True):
+                simulation.set_real(f"craft::{name}", value)
+            simulation.step()
+            rows.append([simulation.get_real(f"craft::{name}") for name in OUTPUTS])
+    return rows
+
+
+def run_fmucontainer(fmu: Path) -> list[list[float]]:
+    """The FMU inside a container FMU, which fmpy drives."""
+    from ..simulation import instantiated, read_description
+
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        shutil.copy(fmu, work / "Hovercraft.fmu")
+        content = {"name": "Container.fmu", "fmu": ["Hovercraft.fmu"], "step_size": COMMUNICATION_STEP}
+        (work / "container.json").write_text(json.dumps(content))
+        code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
+        command = [sys.executable, "-c", code, "-container", "container.json", "-fmu-directory", "."]
+        subprocess.run(command, cwd=work, check=True, stdout=subprocess.DEVNULL)
+        description = read_description(work / "Container.fmu")
+        references = {variable.name: variable.valueReference for variable in description.modelVariables}
+        with instantiated(work / "Container.fmu", description, []) as (_, instance):
+            instance.setupExperiment()
+            instance.enterInitializationMode()
+            instance.exitInitializationMode()
+            rows = []
+            for k, controls in enumerate(CONTROLS):
+                instance.setReal([references[name] for name in INPUTS], controls)
+                instance.doStep(k * COMMUNICATION_STEP, COMMUNICATION_STEP)
+                rows.append(list(instance.getReal([references[name] for name in OUTPUTS])))
+            return rows
+
+
+def run_c(fmu: Path) -> list[list[float]]:
+    """A host in C, compiled here, with Python's library preloaded: what a tool that is not Python does."""
+    description = fmpy.read_model_description(fmu)
+    with tempfile.TemporaryDirectory() as folder:
+        fmpy.extract(fmu, unzipdir=folder)
+        library = Path(folder, "binaries", "linux64", f"{description.coSimulation.modelIdentifier}.so")
+        host = compile_host(Path(folder) / "host")
+        command = [str(host), str(library), description.guid, Path(folder, "resources").as_uri(),
+                   repr(COMMUNICATION_STEP), ",".join(map(str, INPUT_REFERENCES)),
+                   ",".join(map(str, OUTPUT_REFERENCES))]  # fmt: skip
+        lines = "".join(" ".join(map(repr, controls)) + "\n" for controls in CONTROLS)
+        env = {"PATH": os.defpath, "LD_PRELOAD": python_library() or ""}
+        done = subprocess.run(command, input=lines, env=env, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise HostError(f"exit status {done.returncode}: {done.stderr.strip()}")
+    return [[float(text) for text in line.split()] for line in done.stdout.splitlines()]
+
+
+def compile_host(program: Path) -> Path:
+    """Compile host.c with the machine's compiler, warnings as errors."""
+    headers, source = Path(fmpy.__file__).parent / "c-code", Path(__file__).parent / "host.c"
+    command = [compiler() or "cc", "-std=gnu11", "-Wall", "-Wextra", "-Werror", "-isystem", str(headers), str(source),
+               "-o", str(program), "-ldl"]  # fmt: skip
+    subprocess.run(command, check=True)
+    return program
+
+
+RUN: Mapping[str, Callable[[Path], list[list[float]]]] = {
+    "fmpy": run_fmpy,
+    "libcosimpy": run_libcosimpy,
+    "ecospy": run_ecospy,
+    "fmucontainer": run_fmucontainer,
+    "C": run_c,
+}
