@@ -17,7 +17,7 @@ from .fmu.package import build_fmu
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES
 from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, plan, simulate
-from .validation import validate
+from .validation import Check, validate, validate_elsewhere
 
 DEMO_FOLDER = Path("build") / "demo"
 DEMO_LOG = CONTROL_LOGS / "ice.csv"
@@ -107,9 +107,15 @@ def simulate_command(
 
 @commands.command("validate")
 @click.argument("fmus", nargs=-1, metavar="[FMU ...]", type=click.Path(path_type=Path))
-def validate_command(fmus: tuple[Path, ...]) -> int:
+@click.option("--table", is_flag=True, help="Ask other checkers and hosts, too, and print a table (Markdown).")
+def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
     """Check FMUs: the schema, fmpy's validation, and a real run. Default: build/Hovercraft.fmu."""
-    problems = sum(_validated(fmu) for fmu in fmus or (DEFAULT_FMU,))
+    if table:
+        checks = [check for fmu in fmus or (DEFAULT_FMU,) for check in (*validate(fmu), *validate_elsewhere(fmu))]
+        problems = sum(len(check.problems) for check in checks)
+        click.echo(_markdown(checks))
+    else:
+        problems = sum(_validated(fmu) for fmu in fmus or (DEFAULT_FMU,))
     if problems:
         raise click.ClickException(f"{problems} problem{'s' if problems > 1 else ''} found")
     return 0
@@ -178,11 +184,18 @@ def _validated(fmu: Path) -> int:
     OUTPUT.print(f"checking {fmu}")
     problems = 0
     for check in validate(fmu):
-        OUTPUT.print(f"  {'ok    ' if not check.problems else 'FAILED'} {check.what} ({check.checker})")
+        OUTPUT.print(f"  {check.result:6} {check.what} ({check.checker} {check.version})")
         for problem in check.problems:
             OUTPUT.print(f"         {problem}", markup=False)
         problems += len(check.problems)
     return problems
+
+
+def _markdown(checks: list[Check]) -> str:
+    rows = [(c.checker, c.version, c.what, c.result + "".join(f"; {p}" for p in c.problems or [c.missing] if p))
+            for c in checks]  # fmt: skip
+    table = [("checker or host", "version", "what was run", "result"), ("---",) * 4, *rows]
+    return "\n".join(f"| {' | '.join(' '.join(cell.split()) for cell in row)} |" for row in table)
 
 
 def _print_scenes() -> None:

@@ -1,6 +1,7 @@
 """Runs a scene on an FMU, through fmpy, or on the bare model; one kind of result."""
 
 import ast
+import itertools
 import os
 import re
 import tempfile
@@ -15,6 +16,7 @@ import fmpy
 import fmpy.simulation
 import fmpy.util
 import numpy as np
+from fmpy import fmi2
 from numpy.typing import NDArray
 
 from .fmu.description import COMMUNICATION_STEP, MODEL_NAME, STOP_TIME
@@ -330,32 +332,64 @@ def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = N
 def read_description(path: Path, validate: bool = True) -> Any:
     """fmpy's model description. Raises ValueError where the file is no FMU or its description is not valid."""
     try:
-        return fmpy.read_model_description(path, validate=validate)
+        description = fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
         raise ValueError(f"{path}: must be an FMU with a valid model description; {error}") from error
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        raise ValueError(f"{path}: must be an FMU for co-simulation, FMI 2.0")
+    return description
+
+
+MESSAGES: dict[bytes, list[str]] = {}
+"""Instance name -> where its messages go."""
+INSTANCES = itertools.count(1)
+
+
+def _log(_environment: object, name: bytes, status: int, _category: bytes, message: bytes) -> None:
+    if status and name in MESSAGES:
+        MESSAGES[name].append(plain(message.decode(errors="replace")))
+
+
+def _callbacks() -> Any:
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(_log)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    return callbacks
+
+
+CALLBACKS = _callbacks()
+"""Of all instances. fmpy's own way to a logger keeps one for the whole process, and calls it when it is long gone."""
 
 
 @contextmanager
 def instantiated(path: Path, description: Any, messages: list[str]) -> Iterator[tuple[str, Any]]:
     """The folder an FMU is extracted to and an instance in it; both are gone afterwards.
 
-    Logging is on: without it pythonfmu's wrapper keeps its messages, even of errors, to itself.
+    Logging is on, into `messages`: without it pythonfmu's wrapper keeps its messages, even of errors, to itself.
+
+    Raises:
+        SimulationError: the FMU cannot be loaded or instantiated.
     """
-
-    def logger(_environment: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
-        if status:
-            messages.append(plain(message.decode(errors="replace")))
-
-    with tempfile.TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
-        fmpy.extract(path, unzipdir=folder)
-        try:
-            instance = fmpy.instantiate_fmu(folder, description, "CoSimulation", debug_logging=True, logger=logger)
-        except Exception as error:
-            raise SimulationError("; ".join(messages) or f"{path}: {error}") from error
-        try:
-            yield folder, instance
-        finally:
-            instance.freeInstance()
+    identifier = description.coSimulation.modelIdentifier
+    name = f"{identifier} {next(INSTANCES)}"
+    MESSAGES[name.encode()] = messages
+    try:
+        with tempfile.TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
+            fmpy.extract(path, unzipdir=folder)
+            try:
+                instance = fmi2.FMU2Slave(
+                    guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName=name
+                )
+                instance.instantiate(callbacks=CALLBACKS, loggingOn=True)
+            except Exception as error:  # fmpy raises plain exceptions here
+                raise SimulationError("; ".join(messages) or f"{path}: {error}") from error
+            try:
+                yield folder, instance
+            finally:
+                instance.freeInstance()
+    finally:
+        del MESSAGES[name.encode()]
 
 
 def plain(message: str) -> str:

@@ -2,6 +2,8 @@
 
 import os
 import platform
+import subprocess
+import sys
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +14,7 @@ import fmpy.validation
 import numpy as np
 from lxml import etree
 
+from . import hosts
 from .simulation import SimulationError, instantiated, read_description
 
 STEPS = 5
@@ -22,9 +25,16 @@ class Check(NamedTuple):
     """What one check of one FMU found."""
 
     checker: str
-    """Tool and version."""
+    version: str
     what: str
     problems: list[str]
+    missing: str = ""
+    """Why it could not be made; then there are no problems either."""
+
+    @property
+    def result(self) -> str:
+        """In one word."""
+        return "FAILED" if self.problems else "not run" if self.missing else "ok"
 
 
 def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
@@ -37,12 +47,46 @@ def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes one")
-    checker = f"fmpy {fmpy.__version__}"
     description = read_description(path, validate=False)
-    yield Check(f"lxml {etree.__version__}", "XML schema of FMI 2.0", _schema_problems(path))
-    yield Check(checker, "names, units, starts, model structure", list(fmpy.validation.validate_fmu(str(path))))
+    yield Check("lxml", etree.__version__, "XML schema of FMI 2.0", _schema_problems(path))
+    problems = list(fmpy.validation.validate_fmu(str(path)))
+    yield Check("fmpy", fmpy.__version__, "names, units, starts, model structure", problems)
     what = f"load, initialize, {STEPS} steps, read all outputs, free"
-    yield Check(f"{checker}, Python {platform.python_version()}", what, _run_problems(path, description))
+    python = f"{fmpy.__version__}, Python {platform.python_version()}"
+    yield Check("fmpy", python, what, _run_problems(path, description))
+
+
+def validate_elsewhere(path: str | os.PathLike[str]) -> Iterator[Check]:
+    """The checkers and hosts that others wrote, where they are installed; for the hovercraft FMU only."""
+    path = Path(path)
+    toolbox = hosts.HOSTS["fmucontainer"]
+    what, missing = "fmutool -check: schema and semantics", toolbox.missing()
+    version = "" if missing else toolbox.version()
+    yield Check("fmu-manipulation-toolbox", version, what, [] if missing else _fmutool_problems(path), missing)
+    expected = hosts.run_in("fmpy", path)
+    for host in hosts.HOSTS.values():
+        if host.name != "fmpy":
+            yield _host_check(host, path, expected)
+
+
+def _host_check(host: hosts.Host, path: Path, expected: list[list[float]]) -> Check:
+    what = f"{len(expected)} steps with changing inputs: the bits that fmpy gives"
+    missing = host.missing()
+    if missing:
+        return Check(host.name, "", what, [], missing)
+    try:
+        rows = hosts.run_in(host.name, path)
+    except hosts.HostError as error:
+        return Check(host.name, host.version(), what, [str(error)])
+    return Check(host.name, host.version(), what, [] if rows == expected else ["the outputs must equal those in fmpy"])
+
+
+def _fmutool_problems(path: Path) -> list[str]:
+    command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", str(path), "-check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    lines = (done.stdout + done.stderr).splitlines()
+    problems = [line for line in lines if line.startswith(("ERROR", "WARNING", "CRITICAL", "FATAL"))]
+    return problems or ([f"exit status {done.returncode}"] if done.returncode else [])
 
 
 def _schema_problems(path: Path) -> list[str]:
@@ -54,8 +98,6 @@ def _schema_problems(path: Path) -> list[str]:
 
 def _run_problems(path: Path, description: Any) -> list[str]:
     """A description can be clean and the binary still not load: only a run shows it."""
-    if description.coSimulation is None:
-        return ["the FMU must offer co-simulation"]
     experiment = description.defaultExperiment
     step = float(experiment.stepSize if experiment and experiment.stepSize else 0.01)
     messages: list[str] = []

@@ -42,6 +42,18 @@ def test_a_build_leaves_the_process_as_it_was(tmp_path: Path) -> None:
     assert {name for name in sys.modules if name.startswith("hovercraft")} == modules
 
 
+def test_build_run_and_build_again_in_one_process(fresh: Fresh) -> None:
+    code = """
+import hovercraft_fmu as h
+one = h.build_fmu("One.fmu").read_bytes()
+first = h.simulate("turn", "One.fmu")
+assert h.build_fmu("Two.fmu").read_bytes() == one
+assert (h.simulate("turn", "Two.fmu").data == first.data).all()
+print("ok")
+"""
+    assert fresh(code).strip() == "ok"
+
+
 def test_bad_paths(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"x\.zip': must end in \.fmu"):
         build_fmu(tmp_path / "x.zip")

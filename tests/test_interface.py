@@ -49,6 +49,7 @@ TABLE = {
     "thrust_max": ("parameter", "tunable", "exact", "N", "10.0"),
     "step_size": ("parameter", "fixed", "exact", "s", "0.001"),
     "integrator": ("parameter", "fixed", "exact", None, "1"),
+    "warnings": ("local", "discrete", "calculated", None, None),
 }
 DERIVATIVES = {
     "velocity.x": "pose.x",

@@ -8,7 +8,7 @@ from .._version import __version__
 from ..model.craft import PRESETS
 from ..model.integrators import INTEGRATORS
 from .description import DESCRIPTION
-from .interface import VARIABLES, Variable
+from .interface import VARIABLES, WARNINGS, Variable
 
 
 def index_html() -> str:
@@ -17,7 +17,10 @@ def index_html() -> str:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
+    checked = (folder / "checked.md").read_text(encoding="utf-8").splitlines()
     return environment.get_template("index.html.jinja").render(
+        checked=[line.strip("| ").split(" | ") for line in checked if not line.startswith("| ---")],
+        warnings=WARNINGS,
         version=__version__,
         description=DESCRIPTION,
         variables=VARIABLES,

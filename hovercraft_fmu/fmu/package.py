@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
+from types import ModuleType
 
 import pythonfmu
 from pythonfmu.builder import FmuBuilder
@@ -84,7 +85,7 @@ def _archive() -> bytes:
         script.write_text(
             ENTRY_SCRIPT.format(package=package, model=MODEL_NAME, build=build), encoding="utf-8", newline="\n"
         )
-        with _imports_undone():
+        with _apart_from_this_process(package):
             fmu = FmuBuilder.build_FMU(
                 script,
                 dest=work / f"{MODEL_NAME}.fmu",
@@ -134,16 +135,24 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 @contextmanager
-def _imports_undone() -> Iterator[None]:
-    """The builder imports the slave and leaves it, and a folder in sys.path, behind; here nothing stays."""
-    path, modules = list(sys.path), set(sys.modules)
+def _apart_from_this_process(package: str) -> Iterator[None]:
+    """The builder imports the slave, and leaves it and a folder in sys.path behind; here nothing stays.
+
+    Where this very FMU has run in this process its modules are loaded, with the copy of pythonfmu that it carries:
+    they are put aside while it is built.
+    """
+    path, aside = list(sys.path), _taken_out(package)
     try:
         yield
     finally:
         sys.path[:] = path
-        for name in set(sys.modules) - modules:
-            if name.startswith("hovercraft_"):
-                del sys.modules[name]
+        _taken_out(package)
+        sys.modules.update(aside)
+
+
+def _taken_out(package: str) -> dict[str, ModuleType]:
+    names = [name for name in sys.modules if name.startswith(package)]
+    return {name: sys.modules.pop(name) for name in names}
 
 
 def _repacked(fmu: Path, package: str, icon: bytes) -> bytes:

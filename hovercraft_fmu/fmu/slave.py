@@ -291,7 +291,10 @@ class HovercraftSlave(WrappedSlave):
         if not self._started():
             self._take_up_start_values()
         state, reals = self._state, self._reals
-        reals.update(zip(MOTION_REFERENCES, state + observe_motion(state)))  # noqa: B905
+        motion = observe_motion(state)
+        if not math.isfinite(motion[-1]):  # the speed overflows first
+            _refuse_non_finite(MOTION, motion)
+        reals.update(zip(MOTION_REFERENCES, state + motion))  # noqa: B905
         if self._acting:
             for reference in ACTION_REFERENCES:
                 del reals[reference]
@@ -302,6 +305,7 @@ class HovercraftSlave(WrappedSlave):
         """The rest of them, which most hosts never ask for."""
         if not self._acting:
             action = observe_action(self._state, self._controls, self._craft)
+            _refuse_non_finite(ACTION, action)
             self._reals.update(zip(ACTION_REFERENCES, action, strict=True))
             self._acting = True
 
@@ -368,6 +372,12 @@ class HovercraftSlave(WrappedSlave):
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description, made from the table of variables."""
         return model_description(self.build)
+
+
+def _refuse_non_finite(names: tuple[str, ...], values: tuple[float, ...]) -> None:
+    for name, value in zip(names, values, strict=True):
+        if not math.isfinite(value):
+            raise ValueError(f"{name} = {value!r}: must be a finite number; the motion is out of range")
 
 
 def _unknown(kind: str, reference: int) -> ValueError:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
-from importlib import metadata, util
+from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,11 +38,22 @@ class Host(NamedTuple):
     missing: Callable[[], str]
 
 
-def _package(name: str) -> Host:
+def _package(name: str, *modules: str) -> Host:
+    """A host that is a package, and the modules that it runs with."""
+
     def missing() -> str:
-        return "" if util.find_spec(name) else f"not installed: pip install {name.replace('_', '-')}"
+        absent = [each.replace("_", "-") for each in (name, *modules) if not _installed(each)]
+        return f"not installed: pip install {' '.join(absent)}" if absent else ""
 
     return Host(name, lambda: metadata.version(name), missing)
+
+
+def _installed(name: str) -> bool:
+    try:
+        metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return False
+    return True
 
 
 def compiler() -> str | None:
@@ -69,10 +80,10 @@ def _missing_for_c() -> str:
 HOSTS: Mapping[str, Host] = {
     "fmpy": _package("fmpy"),
     "libcosimpy": _package("libcosimpy"),
-    "ecospy": _package("ecospy"),
+    "ecospy": _package("ecospy", "tbb"),
     "fmucontainer": Host("fmucontainer", lambda: metadata.version("fmu_manipulation_toolbox"),
                          _package("fmu_manipulation_toolbox").missing),
-    "C": Host("C", lambda: f"LD_PRELOAD={python_library()}", _missing_for_c),
+    "C host": Host("C host", lambda: f"LD_PRELOAD={python_library()}", _missing_for_c),
 }  # fmt: skip
 
 
@@ -211,5 +222,5 @@ RUN: Mapping[str, Callable[[Path], list[list[float]]]] = {
     "libcosimpy": run_libcosimpy,
     "ecospy": run_ecospy,
     "fmucontainer": run_fmucontainer,
-    "C": run_c,
+    "C host": run_c,
 }
