@@ -28,6 +28,7 @@ from .fmu.interface import (
     MOTION,
     STATES,
     SUBSTEPS_MAX,
+    WATCHED,
     observe_action,
     observe_motion,
 )
@@ -35,7 +36,7 @@ from .fmu.package import build_fmu
 from .model.craft import Craft, preset
 from .model.dynamics import Controls, State
 from .model.integrators import integrator, integrator_number
-from .model.subcycling import Settings, advance
+from .model.subcycling import Settings, advance, stability_number
 from .scenes import Scene, Signals, scene, signals
 
 Value: TypeAlias = float | int | str
@@ -74,7 +75,8 @@ class Run:
     @property
     def settings(self) -> Settings:
         """Sub-step and method."""
-        return Settings(float(self.value("step_size")), integrator(int(self.value("integrator"))))
+        method = integrator(int(self.value("integrator")))
+        return Settings(float(self.value("step_size")), method, float(self.value("tolerance")))
 
     @property
     def start(self) -> State:
@@ -410,18 +412,21 @@ def run_model(run: Run) -> Result:
     """
     craft, settings, state = run.craft, run.settings, run.start
     controls = _controls(run, run.start_time, after_event=False)
-    count = 0
+    count, drag, rotation, proposed = 0, 0.0, 0.0, 0.0
 
     def row(time: float) -> tuple[float, ...]:
-        return time, *controls, *state, *observe_motion(state), *observe_action(state, controls, craft), count
+        seen = (*observe_motion(state), *observe_action(state, controls, craft))
+        return time, *controls, *state, *seen, stability_number(drag, craft), rotation, count
 
     rows = [row(run.start_time)]
     for time, end in communication_points(run):
         controls = _controls(run, time, after_event=True)
-        state, n = advance(state, controls, craft, end - time, settings)
-        count = min(count + n, SUBSTEPS_MAX)
+        stretch = advance(state, controls, craft, end - time, settings, proposed=proposed)
+        state, proposed = stretch.state, stretch.proposed
+        drag, rotation = max(drag, stretch.drag), max(rotation, stretch.rotation)
+        count = min(count + stretch.substeps, SUBSTEPS_MAX)
         rows.append(row(end))
-    names = ("time", *INPUTS, *STATES, *MOTION, *ACTION)
+    names = ("time", *INPUTS, *STATES, *MOTION, *ACTION, *WATCHED)
     return Result(np.array(rows, dtype=[*((name, np.float64) for name in names), ("substeps", np.int32)]), run)
 
 

@@ -103,7 +103,7 @@ assert "numpy" not in sys.modules
     from hovercraft_fmu.model.craft import Craft
     from hovercraft_fmu.model.subcycling import advance
 
-    expected, _ = advance(State(), Controls(8.0, 1.0, 0.0), Craft(), 0.5)
+    expected = advance(State(), Controls(8.0, 1.0, 0.0), Craft(), 0.5).state
     assert printed.strip() == repr(list(expected))
 
 

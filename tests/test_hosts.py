@@ -23,7 +23,7 @@ def test_every_host_gives_the_bits_of_the_bare_model(name: str, fmu: Path) -> No
         pytest.skip(f"{name}: {missing}")
     state, expected = State(), []
     for controls in CONTROLS:
-        state, _ = advance(state, Controls(*controls), Craft(), COMMUNICATION_STEP)
+        state = advance(state, Controls(*controls), Craft(), COMMUNICATION_STEP).state
         expected.append([*state, *observe_motion(state)])
     assert run_in(name, fmu) == expected
 

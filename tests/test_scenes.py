@@ -14,7 +14,7 @@ NAMES = [each.name for each in EXACT]
 def end_error(each: Scene, h: float) -> float:
     """The largest component error at the end of the scene, whose controls hold all the time."""
     assert each.exact
-    state, _ = advance(each.start, Controls(*each.rows[0][1:]), each.craft, each.stop_time, Settings(h))
+    state = advance(each.start, Controls(*each.rows[0][1:]), each.craft, each.stop_time, Settings(h)).state
     exact = each.exact(np.array([each.stop_time]))
     return max(abs(value - float(part[0])) for value, part in zip(state, exact, strict=True))
 

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Literal, TypeAlias
 
 from ..model.craft import Craft
-from ..model.dynamics import Controls, State, body_velocity, loads, saturate, steering
+from ..model.dynamics import Controls, State, actuation, body_velocity, loads
 from ..model.integrators import INTEGRATORS
 
 Kind: TypeAlias = Literal["Real", "Integer", "Enumeration"]
@@ -18,11 +18,13 @@ SUBSTEPS_MAX = 2147483647
 """The largest FMI Integer: the counter of sub-steps stops there."""
 
 
-INPUT_HELD, COUNTER_STOPPED = 1, 2
+INPUT_HELD, COUNTER_STOPPED, STEP_UNSTABLE, STEP_TURNS = 1, 2, 4, 8
 WARNINGS: Mapping[int, str] = MappingProxyType(
     {
         INPUT_HELD: "an input was outside its limits and was held at the limit",
         COUNTER_STOPPED: "the counter of sub-steps reached its end and stopped",
+        STEP_UNSTABLE: "the sub-step is too long for the drag: answers are bounded but wrong, or diverge",
+        STEP_TURNS: "the craft turns too far in a sub-step: answers are wrong however stable",
     }
 )
 """The bits of the variable `warnings`; each is logged when it is first set."""
@@ -175,6 +177,14 @@ VARIABLES: tuple[Variable, ...] = (
     Variable(35, "warnings", "local", "discrete", None, None,
              "Sum of the warnings since initialization: " + "; ".join(f"{b}: {t}" for b, t in WARNINGS.items()),
              kind="Integer", minimum=0, maximum=sum(WARNINGS)),
+    Variable(36, "tolerance", "parameter", "fixed", "1", 1e-6,
+             "For the adaptive integrator: largest error of a step, of any component of the state, in SI units; a "
+             "tolerance that the host gives with the experiment wins", minimum=0.0, nominal=1e-6),
+    Variable(37, "stability_number", "local", "continuous", "1", None,
+             "Largest so far of sub-step * 2*k*q*(1/mass + x_d^2/inertia), the fastest linearized drag rate; the "
+             "classical limits are 2 for Euler, 2.785 for RK4", minimum=0.0),
+    Variable(38, "rotation_per_substep", "local", "continuous", "rad", None,
+             "Largest turn in a sub-step so far: |yaw rate| * sub-step", minimum=0.0),
 )  # fmt: skip
 
 BY_NAME: Mapping[str, Variable] = MappingProxyType({variable.name: variable for variable in VARIABLES})
@@ -186,6 +196,8 @@ INPUTS = ("thrust", "port_thruster", "starboard_thruster")
 STATES = ("pose.x", "pose.y", "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
 """In the order of State."""
 CRAFT_PARAMETERS = tuple(v.name for v in VARIABLES if v.name in Craft.__dataclass_fields__)
+WATCHED = ("stability_number", "rotation_per_substep")
+"""What decides whether to trust the answers; kept by who steps, since initialization."""
 MOTION = ("body.surge", "body.sway", "speed")
 """In the order of `observe_motion`."""
 ACTION = (
@@ -205,4 +217,4 @@ def observe_action(state: State, controls: Controls, craft: Craft) -> tuple[floa
     """What acts on the craft at a state, with the controls of the step that led to it; order of ACTION."""
     force_x, force_y, moment = loads(state, controls, craft)
     acceleration = (force_x / craft.mass, force_y / craft.mass, moment / craft.inertia)
-    return force_x, force_y, moment, *acceleration, saturate(controls, craft).thrust, steering(controls, craft)
+    return force_x, force_y, moment, *acceleration, *actuation(controls, craft)[:2]

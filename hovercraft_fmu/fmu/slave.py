@@ -10,7 +10,14 @@ from xml.etree.ElementTree import Element
 from ..model.craft import Craft, check_parameter
 from ..model.dynamics import Controls, State, saturate
 from ..model.integrators import integrator
-from ..model.subcycling import NonFiniteError, Settings, advance, check_step_size
+from ..model.subcycling import (
+    NonFiniteError,
+    Settings,
+    advance,
+    check_step_size,
+    check_tolerance,
+    stability_number,
+)
 from .description import model_description
 from .interface import (
     ACTION,
@@ -21,9 +28,12 @@ from .interface import (
     INPUTS,
     MOTION,
     STATES,
+    STEP_TURNS,
+    STEP_UNSTABLE,
     SUBSTEPS_MAX,
     VARIABLES,
     WARNINGS,
+    WATCHED,
     Variable,
     observe_action,
     observe_motion,
@@ -41,16 +51,17 @@ INTEGERS = frozenset(v.reference for v in VARIABLES if v.kind != "Real")
 THRUST, PORT, STARBOARD = (BY_NAME[name].reference for name in INPUTS)
 STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
 MOTION_REFERENCES = STATE_REFERENCES + tuple(BY_NAME[name].reference for name in MOTION)
-ACTION_REFERENCES = tuple(BY_NAME[name].reference for name in ACTION)
+ACTION_REFERENCES = tuple(BY_NAME[name].reference for name in ACTION + WATCHED)
 INPUT_REFERENCES = frozenset((THRUST, PORT, STARBOARD))
 ACTION_SET = frozenset(ACTION_REFERENCES)
 STEP_SIZE = BY_NAME["step_size"].reference
 INTEGRATOR = BY_NAME["integrator"].reference
 SUBSTEPS = BY_NAME["substeps"].reference
 WARNED = BY_NAME["warnings"].reference
+TOLERANCE = BY_NAME["tolerance"].reference
 PROJECTED_AREA = BY_NAME["projected_area"].reference
-KEPT_REALS = tuple(v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES)
-"""What a host sets and the slave keeps as it was set: inputs and parameters."""
+KEPT_REALS = (*(v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES),)
+"""What is kept as the host set it: inputs and parameters."""
 DIGEST_SIZE = 64
 """Bytes of the hexadecimal SHA-256 ahead of a serialized state."""
 
@@ -93,6 +104,10 @@ class HovercraftSlave(WrappedSlave):
         self._controls = Controls()
         self._craft = Craft()
         self._settings = Settings()
+        self._hosts_tolerance: float | None = None  # with the experiment; it comes before the parameter
+        self._proposed = 0.0  # the next step of the adaptive method
+        self._drag = self._rotation = 0.0  # the largest of a sub-step so far
+        self._drag_limit = 0.0  # where the stability number passes the method's limit
         self._tuned = False  # a parameter was set since then: the next step takes it up
         self._stale = True  # the motion that is read is not yet that of the communication point
         self._acting = False  # what acts on the craft is among the values that are read
@@ -104,7 +119,9 @@ class HovercraftSlave(WrappedSlave):
         self._require("fmi2SetupExperiment", Phase.INSTANTIATED)
         if not math.isfinite(start_time):
             raise ValueError(f"startTime = {start_time!r} s: must be a finite number")
-        self._time = start_time
+        if tolerance is not None:
+            check_tolerance(tolerance)
+        self._time, self._hosts_tolerance = start_time, tolerance
 
     @called_by_wrapper
     def enter_initialization_mode(self) -> None:
@@ -132,15 +149,22 @@ class HovercraftSlave(WrappedSlave):
             controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD])
             craft = self._make_craft() if self._tuned else self._craft
             try:
-                state, n = advance(self._state, controls, craft, step_size, self._settings)
+                stretch = advance(self._state, controls, craft, step_size, self._settings, proposed=self._proposed)
             except NonFiniteError as error:
                 self._refuse_motion(error)
-            self._state, self._controls, self._craft, self._tuned = state, controls, craft, False
+            self._state, n, drag, rotation, self._proposed = stretch
+            self._controls, self._craft, self._tuned = controls, craft, False
             self._time = current_time + step_size
             self._integers[SUBSTEPS] += n
             self._stale = True
             if self._integers[SUBSTEPS] > SUBSTEPS_MAX:
                 self._stop_counter()
+            if drag > self._drag:
+                self._drag = drag
+            if rotation > self._rotation:
+                self._rotation = rotation
+            if drag > self._drag_limit or rotation > self._settings.integrator.rotation_limit:
+                self._warn_of_the_step()
             thrust, port, starboard = controls
             if not (craft.thrust_min <= thrust <= craft.thrust_max and 0.0 <= port <= 1.0 and 0.0 <= starboard <= 1.0):
                 self._warn_of_held_inputs()
@@ -153,6 +177,22 @@ class HovercraftSlave(WrappedSlave):
     def terminate(self) -> None:
         self._require("fmi2Terminate", Phase.STEPPING)
         self._phase = Phase.TERMINATED
+
+    def _warn_of_the_step(self) -> None:
+        method, step = self._settings.integrator, self._settings.step_size
+        number, rotation = stability_number(self._drag, self._craft), self._rotation
+        if number > method.stability_limit:
+            self._warn(
+                STEP_UNSTABLE,
+                f"stability_number = {number:.4g}: must not pass {method.stability_limit} with {method.name}; set a "
+                f"step_size below {step * method.stability_limit / number:.3g} s, or another integrator",
+            )
+        if rotation > method.rotation_limit:
+            self._warn(
+                STEP_TURNS,
+                f"rotation_per_substep = {rotation:.4g} rad: must not pass {method.rotation_limit} rad; set a "
+                f"step_size below {step * method.rotation_limit / rotation:.3g} s, or the integrator adaptive",
+            )
 
     def _stop_counter(self) -> None:
         self._integers[SUBSTEPS] = SUBSTEPS_MAX
@@ -265,6 +305,8 @@ class HovercraftSlave(WrappedSlave):
             check_step_size(value)
         elif variable.reference == INTEGRATOR:
             integrator(int(value))
+        elif variable.reference == TOLERANCE:
+            check_tolerance(value)
 
     def _after_set(self, vrs: list[int]) -> None:
         if self._phase is Phase.STEPPING:
@@ -276,10 +318,16 @@ class HovercraftSlave(WrappedSlave):
     def _make_craft(self) -> Craft:
         return Craft(**{name: self._reals[BY_NAME[name].reference] for name in CRAFT_PARAMETERS})
 
+    def _take_up_settings(self) -> None:
+        tolerance = self._reals[TOLERANCE] if self._hosts_tolerance is None else self._hosts_tolerance
+        self._settings = Settings(self._reals[STEP_SIZE], integrator(self._integers[INTEGRATOR]), tolerance)
+        # mass, inertia and drag centre are fixed, so this is, too
+        self._drag_limit = self._settings.integrator.stability_limit / stability_number(1.0, self._craft)
+
     def _take_up_start_values(self) -> None:
         reals = self._reals
         self._craft = self._make_craft()
-        self._settings = Settings(reals[STEP_SIZE], integrator(self._integers[INTEGRATOR]))
+        self._take_up_settings()
         self._controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD])
         self._state = State(*(reals[BY_NAME[name].reference] for name in STATES))
         reals[PROJECTED_AREA] = self._craft.projected_area
@@ -306,7 +354,8 @@ class HovercraftSlave(WrappedSlave):
         if not self._acting:
             action = observe_action(self._state, self._controls, self._craft)
             _refuse_non_finite(ACTION, action)
-            self._reals.update(zip(ACTION_REFERENCES, action, strict=True))
+            watched = (stability_number(self._drag, self._craft), self._rotation)
+            self._reals.update(zip(ACTION_REFERENCES, action + watched, strict=True))
             self._acting = True
 
     # ---- FMU state
@@ -323,6 +372,10 @@ class HovercraftSlave(WrappedSlave):
             "controls": list(self._controls),
             "craft": [getattr(self._craft, name) for name in CRAFT_PARAMETERS],
             "tuned": self._tuned,
+            "tolerance": self._hosts_tolerance,
+            "drag": self._drag,
+            "rotation": self._rotation,
+            "proposed": self._proposed,
         }
 
     @called_by_wrapper
@@ -337,7 +390,9 @@ class HovercraftSlave(WrappedSlave):
         self._controls = Controls(*state["controls"])
         self._craft = Craft(**dict(zip(CRAFT_PARAMETERS, state["craft"], strict=True)))
         self._reals[PROJECTED_AREA] = self._craft.projected_area
-        self._settings = Settings(self._reals[STEP_SIZE], integrator(self._integers[INTEGRATOR]))
+        self._hosts_tolerance = state["tolerance"]
+        self._take_up_settings()
+        self._drag, self._rotation, self._proposed = state["drag"], state["rotation"], state["proposed"]
         self._tuned = state["tuned"]
         self._stale = True
 

@@ -70,8 +70,8 @@ class Derivatives(NamedTuple):
     """rad/s2"""
 
 
-LoadFunction: TypeAlias = Callable[[float, float, float, float], tuple[float, float, float]]
-"""(heading, vx, vy, yaw rate) -> (force x, force y, moment)."""
+LoadFunction: TypeAlias = Callable[[float, float, float, float], tuple[float, float, float, float]]
+"""(heading, vx, vy, yaw rate) -> (force x, force y, moment, k*q): the loads, and the drag per air speed [kg/s]."""
 
 
 def saturate(controls: Controls, craft: Craft, ns: Namespace = math) -> Controls:
@@ -89,10 +89,10 @@ def _clip(value: float, low: float, high: float) -> float:
     return low if value < low else high if value > high else value
 
 
-def steering(controls: Controls, craft: Craft, ns: Namespace = math) -> float:
-    """N: the side force of both bow thrusters on the bow, to starboard, after saturation."""
-    _, port, starboard = saturate(controls, craft, ns)
-    return craft.steering_force * (port - starboard)
+def actuation(controls: Controls, craft: Craft, ns: Namespace = math) -> tuple[float, float, float]:
+    """Thrust [N], side force of both bow thrusters [N, to starboard] and their moment [N.m], after saturation."""
+    thrust, port, starboard = saturate(controls, craft, ns)
+    return thrust, craft.steering_force * (port - starboard), craft.thruster_moment * (port - starboard)
 
 
 def load_function(controls: Controls, craft: Craft, ns: Namespace = math) -> LoadFunction:
@@ -103,11 +103,9 @@ def load_function(controls: Controls, craft: Craft, ns: Namespace = math) -> Loa
     """
     cos, sin, sqrt = ns.cos, ns.sin, ns.sqrt
     k, x_d = craft.drag_factor, craft.drag_center
-    thrust, port, starboard = saturate(controls, craft, ns)
-    side = craft.steering_force * (port - starboard)
-    turn = craft.thruster_moment * (port - starboard)
+    thrust, side, turn = actuation(controls, craft, ns)
 
-    def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float]:
+    def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float, float]:
         c = cos(heading)
         s = sin(heading)
         # (u, w): velocity of the centre of drag through the air, body frame. Its size q times the velocity itself
@@ -118,14 +116,19 @@ def load_function(controls: Controls, craft: Craft, ns: Namespace = math) -> Loa
         drag_y = -kq * w
         force_x = thrust - kq * u
         force_y = drag_y + side
-        return c * force_x - s * force_y, s * force_x + c * force_y, x_d * drag_y + turn
+        return c * force_x - s * force_y, s * force_x + c * force_y, x_d * drag_y + turn, kq
 
     return loads_at
 
 
 def loads(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> Loads:
     """Force [N, world frame] and moment [N.m] on the craft: thrust, bow thrusters and air drag."""
-    return Loads(*load_function(controls, craft, ns)(*state[2:]))
+    return Loads(*load_function(controls, craft, ns)(*state[2:])[:3])
+
+
+def drag_per_speed(state: State, craft: Craft, ns: Namespace = math) -> float:
+    """k*q [kg/s]: the drag per air speed of the centre of drag."""
+    return load_function(Controls(), craft, ns)(*state[2:])[3]
 
 
 def derivatives(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> Derivatives:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from .craft import Craft
 from .dynamics import Controls, Namespace, State
-from .integrators import INTEGRATORS, Integrator
+from .integrators import INTEGRATORS, Integrator, Stretch, adaptive
 
 MAX_SUBSTEPS = 10**9
 """Of one communication step: half an hour of computing, or a slip of the decimal point."""
@@ -17,8 +17,10 @@ class Settings(NamedTuple):
     """How the time is cut and the state carried over it."""
 
     step_size: float = 0.001
-    """s, the sub-step"""
+    """s, the sub-step; the first one of the adaptive method"""
     integrator: Integrator = INTEGRATORS[0]
+    tolerance: float = 1e-6
+    """SI units: of the largest component of the error of a step, for the adaptive method"""
 
 
 class NonFiniteError(ArithmeticError):
@@ -40,6 +42,18 @@ def check_step_size(step_size: float) -> None:
         raise ValueError(f"step_size = {step_size!r} s: must be a finite number greater than 0")
 
 
+def check_tolerance(tolerance: float) -> None:
+    """Raises ValueError unless the tolerance is a positive finite number."""
+    if not 0.0 < tolerance < math.inf:
+        raise ValueError(f"tolerance = {tolerance!r}: must be a finite number greater than 0")
+
+
+def check_communication_step(communication_step: float) -> None:
+    """Raises ValueError where the step is negative or not finite."""
+    if not 0.0 <= communication_step < math.inf:
+        raise ValueError(f"communication step = {communication_step!r} s: must be a finite number, not negative")
+
+
 def substeps(communication_step: float, step_size: float) -> tuple[int, float]:
     """Number and size [s] of the sub-steps that make up a communication step [s].
 
@@ -50,8 +64,7 @@ def substeps(communication_step: float, step_size: float) -> tuple[int, float]:
     Raises:
         ValueError: a step that is negative or not finite, or would need more than 10^9 sub-steps.
     """
-    if not 0.0 <= communication_step < math.inf:
-        raise ValueError(f"communication step = {communication_step!r} s: must be a finite number, not negative")
+    check_communication_step(communication_step)
     check_step_size(step_size)
     ratio = communication_step / step_size
     if ratio > MAX_SUBSTEPS + 1:
@@ -81,25 +94,42 @@ def advance(
     communication_step: float,
     settings: Settings = Settings(),  # noqa: B008 - immutable
     ns: Namespace = math,
-) -> tuple[State, int]:
-    """The state one communication step [s] later, with the controls held, and the number of sub-steps it took.
+    proposed: float = 0.0,
+) -> Stretch:
+    """The state one communication step [s] later, with the controls held, and how it got there.
 
-    A step of 0 changes no bit.
+    A step of 0 changes no bit. `proposed` is what the last step of the adaptive method returned; 0 at the start.
 
     Raises:
         ValueError: see `substeps`.
         NonFiniteError: the motion left the range of numbers (plain floats only; arrays of craft are not searched).
+        StepTooSmallError: the adaptive method cannot meet its tolerance.
     """
     if communication_step == 0.0:
-        return state, 0
+        return Stretch(state, 0, 0.0, 0.0, proposed)
+    method = settings.integrator.integrate
+    if method is None:
+        if ns is not math:
+            raise ValueError("integrator = 'adaptive': must be another one for arrays of craft, which share the step")
+        check_communication_step(communication_step)
+        return adaptive(state, controls, craft, communication_step, settings.tolerance, proposed or settings.step_size)
     n, h = substeps(communication_step, settings.step_size)
     try:
-        new = settings.integrator.integrate(state, controls, craft, h, n, ns)
+        stretch = method(state, controls, craft, h, n, ns)
     except (ValueError, OverflowError):  # what math.sin says of an infinite angle
-        new = State(*[math.nan] * 6)
-    if ns is math and not math.isfinite(sum(new)):
-        _refuse_non_finite(new, h)
-    return new, n
+        stretch = Stretch(State(*[math.nan] * 6), n, 0.0, 0.0)
+    if ns is math and not math.isfinite(sum(stretch.state)):
+        _refuse_non_finite(stretch.state, h)
+    return stretch
+
+
+def stability_number(drag: float, craft: Craft) -> float:
+    """1: the sub-step times the fastest linearized drag rate, from the largest h*k*q [kg] of a sub-step.
+
+    Drag k*q*(u, w) at a steady q along the motion changes by 2*k*q along it and by k*q across; a push at the drag
+    point moves the craft by 1/m and turns the point by x_d^2/I. So no rate is above 2*k*q*(1/m + x_d^2/I).
+    """
+    return 2.0 * drag * (1.0 / craft.mass + craft.drag_center * craft.drag_center / craft.inertia)
 
 
 def _refuse_non_finite(state: State, h: float) -> None:

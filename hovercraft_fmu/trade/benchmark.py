@@ -79,7 +79,7 @@ def _cases(instance: Any) -> Mapping[str, Callable[[], None]]:
 
     def bare() -> None:
         nonlocal bare_state
-        bare_state, _ = advance(bare_state, CONTROLS, craft, COMMUNICATION_STEP, settings)
+        bare_state = advance(bare_state, CONTROLS, craft, COMMUNICATION_STEP, settings).state
 
     def fmu() -> None:
         nonlocal time
