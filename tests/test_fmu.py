@@ -13,13 +13,13 @@ import fmpy
 import numpy as np
 import pytest
 
-from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES
+from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, WATCHED
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import SimulationError, instantiated, plan, read_description, run_fmu, run_model
+from hovercraft_fmu.simulation import Run, SimulationError, instantiated, plan, read_description, run_fmu, run_model
 from tests.conftest import Fresh
 
-COLUMNS = (*INPUTS, *STATES, *MOTION, *ACTION, "substeps")
+COLUMNS = (*INPUTS, *STATES, *MOTION, *ACTION, *WATCHED, "substeps")
 SIMULATE_ALL = """
 import json, sys, fmpy, numpy as np
 fmu, folder = sys.argv[1:]
@@ -37,11 +37,27 @@ def reference(name: str) -> int:
     return BY_NAME[name].reference
 
 
+SETTINGS: dict[str, dict[str, Any]] = {
+    "semi_implicit_euler": {},
+    "drag_implicit": {"step_size": 0.02},
+    "rk4": {"step_size": 0.1},
+    "adaptive": {"step_size": 0.05, "tolerance": 1e-7},
+}
+
+
+def planned() -> dict[str, Run]:
+    """Every scene with every method."""
+    return {
+        f"{name} {method}": plan(name, start_values={**values, "integrator": method})
+        for name in SCENES
+        for method, values in SETTINGS.items()
+    }
+
+
 def write_runs(folder: Path) -> None:
     """What a script needs to simulate every scene with fmpy alone."""
     runs = {}
-    for name in SCENES:
-        run = plan(name)
+    for name, run in planned().items():
         np.save(folder / f"{name}.npy", run.signals)
         runs[name] = {
             "start_values": dict(run.start_values),
@@ -54,14 +70,14 @@ def write_runs(folder: Path) -> None:
 
 
 def assert_equal_to_the_model(folder: Path) -> None:
-    for name in SCENES:
-        result, expected = np.load(folder / f"{name}.result.npy"), run_model(plan(name))
+    for name, run in planned().items():
+        result, expected = np.load(folder / f"{name}.result.npy"), run_model(run)
         assert set(result.dtype.names) == set(expected.names)
         for column in expected.names:
             assert np.array_equal(result[column], expected[column]), (name, column)
 
 
-def test_every_scene_equals_the_bare_model_to_the_bit(fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
+def test_every_scene_and_method_equals_the_bare_model_to_the_bit(fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
     write_runs(tmp_path)
     assert fresh(SIMULATE_ALL, fmu, tmp_path).split() == ["installed"]
     assert_equal_to_the_model(tmp_path)

@@ -9,7 +9,7 @@ import fmpy
 import pytest
 from lxml import etree
 
-from hovercraft_fmu.fmu.interface import ACTION, INPUTS, MOTION, STATES, UNITS, VARIABLES
+from hovercraft_fmu.fmu.interface import ACTION, INPUTS, MOTION, STATES, UNITS, VARIABLES, WATCHED
 from hovercraft_fmu.model.integrators import INTEGRATORS
 
 # name: (causality, variability, initial, unit, start)
@@ -50,6 +50,9 @@ TABLE = {
     "step_size": ("parameter", "fixed", "exact", "s", "0.001"),
     "integrator": ("parameter", "fixed", "exact", None, "1"),
     "warnings": ("local", "discrete", "calculated", None, None),
+    "tolerance": ("parameter", "fixed", "exact", "1", "1e-06"),
+    "stability_number": ("local", "continuous", "calculated", "1", None),
+    "rotation_per_substep": ("local", "continuous", "calculated", "rad", None),
 }
 DERIVATIVES = {
     "velocity.x": "pose.x",
@@ -150,4 +153,4 @@ def test_the_head_of_the_description(description: Any, xml: Any) -> None:
 
 def test_the_groups_of_the_table_cover_it() -> None:
     names = [v.name for v in VARIABLES if v.variability == "continuous"]
-    assert names == [*INPUTS, *STATES, *MOTION, *ACTION]
+    assert names == [*INPUTS, *STATES, *MOTION, *ACTION, *WATCHED]

@@ -64,10 +64,10 @@ def test_too_many_substeps_are_refused(communication_step: float, step_size: flo
 
 @given(states, crafts, controls)
 def test_a_step_of_nothing_changes_no_bit(state: State, craft: Craft, asked: Controls) -> None:
-    assert advance(state, asked, craft, 0.0) == (state, 0)
+    assert advance(state, asked, craft, 0.0)[:2] == (state, 0)
 
 
-@pytest.mark.parametrize("number", range(1, len(INTEGRATORS) + 1))
+@pytest.mark.parametrize("number", [i for i, method in enumerate(INTEGRATORS, 1) if method.integrate])
 def test_the_bits_do_not_depend_on_how_the_time_is_cut(number: int) -> None:
     settings = Settings(0.001, integrator(number))
     asked, craft = Controls(8.0, 1.0, 0.25), Craft()
@@ -98,7 +98,7 @@ def test_a_motion_out_of_range_is_refused(start: State) -> None:
 
 def test_methods_have_names_and_numbers() -> None:
     assert integrator_number("semi_implicit_euler") == 1
-    assert integrator(1).name == "semi_implicit_euler"
+    assert [method.name for method in INTEGRATORS] == ["semi_implicit_euler", "drag_implicit", "rk4", "adaptive"]
     for bad in (0, -1, len(INTEGRATORS) + 1):
         with pytest.raises(ValueError, match=f"integrator = {bad}: must be one of 1 "):
             integrator(bad)

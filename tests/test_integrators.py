@@ -1,0 +1,177 @@
+"""What is promised of each method: order, exactness, energy, error control."""
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
+from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator, integrator_number
+from hovercraft_fmu.model.subcycling import Settings, advance, stability_number
+from hovercraft_fmu.scenes import COAST_SPEED, SCENES
+from tests.strategies import controls, crafts, numbers, states
+from tests.test_scenes import EXACT, NAMES
+
+NONE = Controls(0.0, 0.0, 0.0)
+FIXED = [method for method in INTEGRATORS if method.integrate]
+ORDERS = {"semi_implicit_euler": 1.0, "drag_implicit": 1.0, "rk4": 4.0}
+
+
+def method(name: str) -> Any:
+    return integrator(integrator_number(name))
+
+
+@pytest.mark.parametrize("name", ORDERS)
+@pytest.mark.parametrize("scene", [each for each in EXACT if each.name != "coast"], ids=lambda each: each.name)
+def test_order_is_a_slope(name: str, scene: Any) -> None:
+    """On the smooth scenes with an exact solution; coasting has its own test, where drag_implicit is exact."""
+    steps = np.array([0.04, 0.02, 0.01, 0.005]) * (12.0 if name == "rk4" else 1.0)  # above rounding
+    errors = []
+    for h in steps:
+        end = advance(scene.start, Controls(*scene.rows[0][1:]), scene.craft, 48.0, Settings(h, method(name))).state
+        exact = scene.exact(np.array([48.0]))
+        errors.append(max(abs(value - float(part[0])) for value, part in zip(end, exact, strict=True)))
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(ORDERS[name], abs=0.1)
+
+
+@pytest.mark.parametrize("h", [1e-3, 0.1, 10.0])
+def test_drag_implicit_coasts_at_the_exact_speed(h: float) -> None:
+    end = advance(State(vx=COAST_SPEED), NONE, Craft(), 60.0, Settings(h, method("drag_implicit"))).state
+    assert end.vx == pytest.approx(COAST_SPEED / (1.0 + 0.57421875 * COAST_SPEED * 60.0), rel=1e-11)  # 6e4 roundings
+
+
+@pytest.mark.parametrize("h", [0.01, 1.0, 100.0])
+def test_drag_implicit_keeps_the_exact_terminal_speed(h: float) -> None:
+    terminal = math.sqrt(5.0 / Craft().drag_factor)
+    start = State(vx=terminal)
+    end = advance(start, Controls(5.0, 0.0, 0.0), Craft(), 1000 * h, Settings(h, method("drag_implicit"))).state
+    assert end.vx == pytest.approx(terminal, rel=1e-13)
+
+
+extreme_crafts = st.builds(
+    Craft,
+    mass=numbers(1e-3, 1e6),
+    inertia=numbers(1e-3, 1e6),
+    length=numbers(0.1, 100.0),
+    width=st.just(10.0),
+    height=st.just(5.0),
+    drag_coefficient=numbers(0.0, 10.0),
+    air_density=numbers(0.0, 1000.0),
+    drag_center_fraction=numbers(-0.5, 0.5),
+    steering_force=st.just(3.0),
+    thrust_min=st.just(0.0),
+    thrust_max=st.just(10.0),
+)
+extreme_states = st.builds(
+    State,
+    x=st.just(0.0),
+    y=st.just(0.0),
+    heading=numbers(-1e6, 1e6),
+    vx=numbers(-1e6, 1e6),
+    vy=numbers(-1e6, 1e6),
+    yaw_rate=numbers(-1e4, 1e4),
+)
+
+
+@given(extreme_crafts, extreme_states, numbers(1e-4, 100.0))
+def test_drag_implicit_never_adds_energy(craft: Craft, state: State, h: float) -> None:
+    energy = kinetic_energy(state, craft)
+    for _ in range(20):
+        state = advance(state, NONE, craft, h, Settings(h, method("drag_implicit"))).state
+        after = kinetic_energy(state, craft)
+        assert after <= energy * (1.0 + 1e-13)  # some hundred roundings a step
+        energy = after
+
+
+@given(crafts, states, controls, numbers(1e-4, 1e-3))
+def test_drag_implicit_solves_its_equations(craft: Craft, state: State, asked: Controls, h: float) -> None:
+    """Against numpy's solver on the full 3 x 3 system, in the world frame."""
+    from hovercraft_fmu.model.dynamics import actuation, drag_per_speed
+
+    kq = drag_per_speed(state, craft)
+    ahead = np.array([math.cos(state.heading), math.sin(state.heading)])
+    starboard = np.array([-ahead[1], ahead[0]])
+    thrust, side, turn = actuation(asked, craft)
+    # velocity of the drag point = J (vx, vy, yaw rate)
+    point = np.column_stack([np.eye(2), craft.drag_center * starboard])
+    inertia = np.diag([craft.mass, craft.mass, craft.inertia])
+    push = np.append(thrust * ahead + side * starboard, turn)
+    expected = np.linalg.solve(inertia + h * kq * point.T @ point, inertia @ np.array(state[3:]) + h * push)
+    end = advance(state, asked, craft, h, Settings(h, method("drag_implicit"))).state
+    scale = np.abs(state[3:]).max() + h * np.abs(push).max() / min(craft.mass, craft.inertia)
+    assert end[3:] == pytest.approx(expected, rel=0.0, abs=1e-9 * scale)  # the condition of the system is up to 1e6
+
+
+@pytest.mark.parametrize("scene", EXACT, ids=NAMES)
+def test_the_error_of_adaptive_falls_with_its_tolerance(scene: Any) -> None:
+    """Over six decades, and never above a hundred times the tolerance at the end of a minute."""
+    tolerances, errors = 10.0 ** -np.arange(3.0, 9.5, 1.0), []
+    exact = scene.exact(np.array([60.0]))
+    for tolerance in tolerances:
+        settings = Settings(0.01, method("adaptive"), float(tolerance))
+        end = advance(scene.start, Controls(*scene.rows[0][1:]), scene.craft, 60.0, settings).state
+        errors.append(max(abs(value - float(part[0])) for value, part in zip(end, exact, strict=True)))
+    assert all(error <= 100.0 * tolerance for error, tolerance in zip(errors, tolerances, strict=True))
+    assert errors[-1] <= 1e-4 * errors[0]
+    assert np.polyfit(np.log(tolerances), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.3)
+
+
+def test_adaptive_does_not_depend_on_where_the_craft_is() -> None:
+    ends = []
+    for x in (0.0, 2.0**20):  # a power of two, so that the far craft's position has its bits, too
+        settings = Settings(0.01, method("adaptive"), 1e-6)
+        stretch = advance(State(x=x, vx=1.0), Controls(5.0, 1.0, 0.0), Craft(), 30.0, settings)
+        ends.append((stretch.substeps, stretch.proposed, stretch.state[2:]))
+    assert ends[0] == ends[1]
+
+
+@given(st.lists(numbers(1e-13, 5.0), min_size=1, max_size=20))
+def test_adaptive_ends_exactly_on_time(steps: list[float]) -> None:
+    state, proposed = State(vx=1.0), 0.0
+    settings = Settings(0.01, method("adaptive"))
+    for step in steps:
+        state, _, _, _, proposed = advance(state, NONE, Craft(drag_coefficient=0.0), step, settings, proposed=proposed)
+    assert state.x == pytest.approx(math.fsum(steps), rel=1e-13)
+
+
+def test_adaptive_says_where_it_cannot_go_on() -> None:
+    hard = Craft(mass=1e-3, inertia=1e-3, air_density=1000.0)
+    with pytest.raises(StepTooSmallError, match=r"must not fall below 1e-12 s to meet tolerance = 1e-14; set a larger"):
+        advance(State(vx=1e6), NONE, hard, 1.0, Settings(1e-3, method("adaptive"), 1e-14))
+
+
+def test_adaptive_takes_one_craft() -> None:
+    with pytest.raises(ValueError, match="must be another one for arrays of craft"):
+        advance(State(), NONE, Craft(), 1.0, Settings(0.1, method("adaptive")), np)
+
+
+@pytest.mark.parametrize("each", INTEGRATORS, ids=lambda each: each.name)
+def test_what_is_watched(each: Any) -> None:
+    """Coasting slows down, so the largest number is that of the first sub-step; the spin is without drag."""
+    craft = Craft(drag_center_fraction=0.0)
+    stretch = advance(State(vx=1.0), NONE, craft, 0.5, Settings(0.05, each))
+    step = 0.05 if each.integrate else stretch.drag / craft.drag_factor  # of the adaptive method: some step's
+    assert stability_number(stretch.drag, craft) == pytest.approx(step * 2.0 * craft.drag_factor / craft.mass)
+    spin = advance(State(yaw_rate=-3.0), NONE, Craft(drag_coefficient=0.0), 0.5, Settings(0.05, each))
+    assert spin.rotation == pytest.approx(0.15) if each.integrate else spin.rotation <= 1.5
+
+
+def test_rk4_beats_both_first_order_methods() -> None:
+    """At equal steps on the pulses of `turn`, against RK4 at a hundredth of the step."""
+    turn = SCENES["turn"]
+
+    def end(name: str, h: float) -> State:
+        state = turn.start
+        held = {row[0]: Controls(*row[1:]) for row in turn.rows}  # of two rows at one time, the second
+        for start, stop in itertools.pairwise(sorted(held)):
+            state = advance(state, held[start], turn.craft, stop - start, Settings(h, method(name))).state
+        return state
+
+    reference = end("rk4", 0.001)
+    errors = {name: math.dist(end(name, 0.1)[:2], reference[:2]) for name in ORDERS}
+    assert errors["rk4"] < 1e-3 * min(errors["drag_implicit"], errors["semi_implicit_euler"])
