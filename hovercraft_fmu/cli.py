@@ -9,7 +9,7 @@ from typing import Any
 import click
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from ._version import __version__
@@ -18,6 +18,7 @@ from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES
 from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, plan, simulate
 from .validation import Check, validate, validate_elsewhere
+from .view.tables import markdown
 
 DEMO_FOLDER = Path("build") / "demo"
 DEMO_LOG = CONTROL_LOGS / "ice.csv"
@@ -113,7 +114,7 @@ def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
     if table:
         checks = [check for fmu in fmus or (DEFAULT_FMU,) for check in (*validate(fmu), *validate_elsewhere(fmu))]
         problems = sum(len(check.problems) for check in checks)
-        click.echo(_markdown(checks))
+        click.echo(_checked_table(checks))
     else:
         problems = sum(_validated(fmu) for fmu in fmus or (DEFAULT_FMU,))
     if problems:
@@ -147,6 +148,29 @@ def benchmark() -> None:
     OUTPUT.print(measure())
 
 
+@commands.command()
+@click.option("--quick", is_flag=True, help="One scene, one repeat: half a minute instead of minutes.")
+@click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "trade", show_default=True)
+def trade(quick: bool, output: Path) -> None:
+    """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes."""
+    from .trade import work_precision
+
+    with _progress(1.0, "measuring") as tell:
+        report = work_precision.run(output, quick, tell)
+    OUTPUT.print(report)
+
+
+@commands.command()
+@click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "stability", show_default=True)
+def stability(output: Path) -> None:
+    """Measure where each method breaks: limits of the step, and a random study of the extremes."""
+    from .trade import stability as study
+
+    with _progress(1.0, "measuring") as tell:
+        report = study.run(output, tell)
+    OUTPUT.print(report)
+
+
 # ---- what the commands share
 
 
@@ -164,12 +188,12 @@ def _setting(text: str) -> tuple[str, str]:
 
 
 @contextmanager
-def _progress(stop_time: float) -> Iterator[Callable[[float], None]]:
+def _progress(total: float, doing: str = "simulating") -> Iterator[Callable[[float], None]]:
     """A bar with the time left, on a terminal; it goes away when the run has ended."""
-    columns = (TextColumn("simulating"), BarColumn(), TextColumn("{task.completed:.0f} s"), TimeRemainingColumn())
+    columns = (TextColumn(doing), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("", total=stop_time)
+        task = progress.add_task("", total=total)
         yield lambda time: progress.update(task, completed=time)
 
 
@@ -191,11 +215,17 @@ def _validated(fmu: Path) -> int:
     return problems
 
 
-def _markdown(checks: list[Check]) -> str:
-    rows = [(c.checker, c.version, c.what, c.result + "".join(f"; {p}" for p in c.problems or [c.missing] if p))
-            for c in checks]  # fmt: skip
-    table = [("checker or host", "version", "what was run", "result"), ("---",) * 4, *rows]
-    return "\n".join(f"| {' | '.join(' '.join(cell.split()) for cell in row)} |" for row in table)
+def _checked_table(checks: list[Check]) -> str:
+    rows = [
+        (
+            check.checker,
+            check.version,
+            check.what,
+            "; ".join([check.result, *check.problems, check.missing]).rstrip("; "),
+        )
+        for check in checks
+    ]
+    return markdown(("checker or host", "version", "what was run", "result"), rows)
 
 
 def _print_scenes() -> None:

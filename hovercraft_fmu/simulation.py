@@ -419,8 +419,7 @@ def run_model(run: Run) -> Result:
         return time, *controls, *state, *seen, stability_number(drag, craft), rotation, count
 
     rows = [row(run.start_time)]
-    for time, end in communication_points(run):
-        controls = _controls(run, time, after_event=True)
+    for time, end, controls in schedule(run):
         stretch = advance(state, controls, craft, end - time, settings, proposed=proposed)
         state, proposed = stretch.state, stretch.proposed
         drag, rotation = max(drag, stretch.drag), max(rotation, stretch.rotation)
@@ -435,6 +434,12 @@ def _controls(run: Run, time: float, after_event: bool) -> Controls:
     table = np.stack([run.signals[name] for name in INPUTS])
     values, _ = fmpy.simulation.Input.interpolate(time, times, table, after_event=after_event)
     return Controls(*(float(value) for value in np.ravel(values)))
+
+
+def schedule(run: Run) -> Iterator[tuple[float, float, Controls]]:
+    """(start, end) [s] of every communication step, and the controls that hold in it, as fmpy's master sets them."""
+    for time, end in communication_points(run):
+        yield time, end, _controls(run, time, after_event=True)
 
 
 def communication_points(run: Run) -> Iterator[tuple[float, float]]:

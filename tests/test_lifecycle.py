@@ -20,6 +20,8 @@ from hovercraft_fmu.fmu.interface import (
     INPUTS,
     MOTION,
     STATES,
+    STEP_TURNS,
+    STEP_UNSTABLE,
     SUBSTEPS_MAX,
     observe_action,
     observe_motion,
@@ -397,6 +399,84 @@ def test_a_state_of_another_build_is_refused(instance: Any, messages: list[str])
     with pytest.raises(FMICallException):
         instance.deSerializeFMUstate(hashlib.sha256(text).hexdigest().encode() + text)
     assert f"FMU state of build {'0' * 32}: must be a state of this build" in messages[-1]
+
+
+# ---- methods
+
+
+def _adaptive(instance: Any, hosts: float | None = None, **values: float) -> None:
+    instance.setupExperiment(tolerance=hosts)
+    instance.setInteger([reference("integrator")], [4])
+    put(instance, **values)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    put(instance, port_thruster=1.0)
+
+
+def test_a_rolled_back_adaptive_run_repeats_to_the_bit(instance: Any) -> None:
+    """The proposed step is part of the state."""
+    _adaptive(instance)
+    instance.doStep(0.0, 7.0)
+    content = instance.serializeFMUstate(instance.getFMUstate())
+    instance.doStep(7.0, 5.0)
+    there = everything(instance)
+    instance.setFMUstate(instance.deSerializeFMUstate(content))
+    instance.doStep(7.0, 5.0)
+    assert everything(instance) == there
+    instance.reset()
+    instance.setFMUstate(instance.deSerializeFMUstate(content))
+    instance.doStep(7.0, 5.0)
+    assert everything(instance) == there
+
+
+def test_the_hosts_tolerance_wins_over_the_parameter(instance: Any, messages: list[str]) -> None:
+    counts = []
+    for tolerance, parameter in ((None, 1e-9), (1e-9, 1e-3), (None, 1e-3), (1e-3, 1e-9)):
+        instance.reset()
+        _adaptive(instance, tolerance, tolerance=parameter)
+        instance.doStep(0.0, 60.0)
+        counts.append(count(instance))
+    assert counts[0] == counts[1] > 2 * counts[2]
+    assert counts[2] == counts[3]
+    instance.reset()
+    with pytest.raises(FMICallException):
+        instance.setupExperiment(tolerance=-1.0)
+    assert messages[-1] == "tolerance = -1.0: must be a finite number greater than 0"
+
+
+def test_where_the_adaptive_method_cannot_go_on_it_says_so(instance: Any, messages: list[str]) -> None:
+    hard = {"mass": 1e-3, "inertia": 1e-3, "air_density": 1000.0, "velocity__x": 1e6, "tolerance": 1e-14}
+    _adaptive(instance, **hard)
+    before = everything(instance)
+    with pytest.raises(FMICallException):
+        instance.doStep(0.0, 1.0)
+    assert "must not fall below 1e-12 s to meet tolerance = 1e-14; set a larger tolerance" in messages[-1]
+    assert everything(instance) == before
+
+
+@pytest.mark.parametrize(
+    ("number", "values", "bit", "message"),
+    [
+        (1, {"velocity__x": 100.0, "step_size": 0.05}, STEP_UNSTABLE, "must not pass 2.0 with semi_implicit_euler"),
+        (3, {"velocity__x": 100.0, "step_size": 0.05}, STEP_UNSTABLE, "must not pass 2.785 with rk4"),
+        (2, {"velocity__yaw_rate": 20.0, "step_size": 0.05}, STEP_TURNS, "rotation_per_substep = 1 rad: must not pass"),
+    ],
+)
+def test_a_step_that_is_too_long_is_told_once(
+    number: int, values: dict[str, float], bit: int, message: str, instance: Any, messages: list[str]
+) -> None:
+    instance.setupExperiment()
+    instance.setInteger([reference("integrator")], [number])
+    put(instance, **values)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    instance.doStep(0.0, 0.05)
+    assert count(instance, "warnings") == bit
+    assert len(messages) == 1
+    assert message in messages[0]
+    assert "set a step_size below" in messages[0]
+    instance.doStep(0.05, 0.05)
+    assert len(messages) == 1
 
 
 # ---- communication points

@@ -1,5 +1,7 @@
-"""The page that ships inside the FMU, from its template and the table of variables."""
+"""The pages that ship inside the FMU, from their templates, the table of variables and the committed measurements."""
 
+import csv
+from collections import defaultdict
 from pathlib import Path
 
 import jinja2
@@ -10,24 +12,57 @@ from ..model.integrators import INTEGRATORS
 from .description import DESCRIPTION
 from .interface import VARIABLES, WARNINGS, Variable
 
+FOLDER = Path(__file__).parent / "documentation"
+RESULTS = FOLDER / "results"
+"""What `hovercraft-fmu trade` and `hovercraft-fmu stability` wrote, with `--output` there."""
 
-def index_html() -> str:
-    """The whole page."""
-    folder = Path(__file__).parent / "documentation"
+
+def pages() -> dict[str, str]:
+    """Path inside the documentation -> the whole page."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+        loader=jinja2.FileSystemLoader(FOLDER), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
-    checked = (folder / "checked.md").read_text(encoding="utf-8").splitlines()
-    return environment.get_template("index.html.jinja").render(
-        checked=[line.strip("| ").split(" | ") for line in checked if not line.startswith("| ---")],
-        warnings=WARNINGS,
-        version=__version__,
-        description=DESCRIPTION,
-        variables=VARIABLES,
-        limits=_limits,
-        integrators=INTEGRATORS,
-        presets=PRESETS,
-    )
+    checked = (FOLDER / "checked.md").read_text(encoding="utf-8").splitlines()
+    values = {
+        "version": __version__,
+        "description": DESCRIPTION,
+        "variables": VARIABLES,
+        "limits": _limits,
+        "warnings": WARNINGS,
+        "integrators": INTEGRATORS,
+        "presets": PRESETS,
+        "checked": [line.strip("| ").split(" | ") for line in checked if not line.startswith("| ---")],
+        "measured": _all_measured(),
+        "machine": _machine(),
+    }
+    return {
+        template.removesuffix(".jinja"): environment.get_template(template).render(values)
+        for template in environment.list_templates(extensions=["jinja"])
+        if template.endswith(".html.jinja")
+    }
+
+
+def _all_measured() -> dict[str, list[dict[str, str]]]:
+    """Table -> rows; none for a table that was not measured yet: the measuring builds an FMU, too."""
+    return defaultdict(list, {path.stem: _measured(path) for path in sorted(RESULTS.glob("*.csv"))})
+
+
+def _machine() -> str:
+    path = RESULTS / "machine.txt"
+    return path.read_text(encoding="utf-8").strip() if path.exists() else ""
+
+
+def _measured(path: Path) -> list[dict[str, str]]:
+    """The rows of a CSV file, numbers short enough to read."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [{name: _short(text) for name, text in row.items()} for row in csv.DictReader(file)]
+
+
+def _short(text: str) -> str:
+    try:
+        return f"{float(text):.3g}"
+    except ValueError:
+        return text
 
 
 def _limits(variable: Variable) -> str:

@@ -16,7 +16,7 @@ import pythonfmu
 from pythonfmu.builder import FmuBuilder
 
 from .description import MODEL_NAME
-from .document import index_html
+from .document import pages
 from .icon import icon_png
 
 PACKAGE = Path(__file__).parent.parent
@@ -105,7 +105,8 @@ def _documents() -> dict[str, bytes]:
         for path in sorted(STATIC.rglob("*"))
         if path.is_file() and path.suffix != ".jinja"
     }
-    return {**static, "index.html": index_html().encode(), "licenses/pythonfmu.txt": _pythonfmu_license()}
+    made = {name: page.encode() for name, page in pages().items()}
+    return {**static, **made, "licenses/pythonfmu.txt": _pythonfmu_license()}
 
 
 def _pythonfmu_license() -> bytes:

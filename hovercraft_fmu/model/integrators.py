@@ -51,7 +51,7 @@ def semi_implicit_euler(
     loads_at = load_function(controls, craft, ns)
     mass, inertia, single = craft.mass, craft.inertia, ns is math
     x, y, heading, vx, vy, yaw_rate = state
-    most = fastest = 0.0
+    most, fastest = 0.0, abs(yaw_rate) if single else 0.0
     for block in _blocks(n):
         for _ in range(block):
             force_x, force_y, moment, kq = loads_at(heading, vx, vy, yaw_rate)
@@ -92,7 +92,7 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     mass, inertia, x_d = craft.mass, craft.inertia, craft.drag_center
     spread = inertia + mass * x_d * x_d
     x, y, heading, vx, vy, yaw_rate = state
-    most = fastest = 0.0
+    most, fastest = 0.0, abs(yaw_rate) if single else 0.0
     for block in _blocks(n):
         for _ in range(block):
             kq = loads_at(heading, vx, vy, yaw_rate)[3]
@@ -131,7 +131,7 @@ def rk4(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Na
     mass, inertia, single = craft.mass, craft.inertia, ns is math
     half, sixth, square = 0.5 * h, h / 6.0, h * h / 6.0
     x, y, heading, vx, vy, yaw_rate = state
-    most = fastest = 0.0
+    most, fastest = 0.0, abs(yaw_rate) if single else 0.0
     for block in _blocks(n):
         for _ in range(block):
             fx1, fy1, m1, kq = loads_at(heading, vx, vy, yaw_rate)

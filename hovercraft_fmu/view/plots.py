@@ -28,7 +28,7 @@ def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
         OSError: the file cannot be written.
     """
     path = Path(path)
-    figure = _figure(figsize=(12.0, 6.75), dpi=120, layout="constrained")
+    figure = new_figure(figsize=(12.0, 6.75), dpi=120, layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
     figure.suptitle(f"{result.run.title}: {result.distance:.0f} m in {result['time'][-1] - result['time'][0]:g} s")
     _draw_path(figure.add_subplot(grid[:, 0]), result)
@@ -43,7 +43,8 @@ def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
     return path
 
 
-def _figure(**options: Any) -> "Figure":
+def new_figure(**options: Any) -> "Figure":
+    """matplotlib's Figure, without a window. Raises ModuleNotFoundError, which says how to install it."""
     try:
         module = importlib.import_module("matplotlib.figure")
     except ModuleNotFoundError as error:

@@ -1,0 +1,102 @@
+"""The measurement measures: its errors, its orders, its advice. No clock is asserted."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from hovercraft_fmu.cli import commands
+from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.simulation import schedule
+from hovercraft_fmu.trade.reference import reference_end
+from hovercraft_fmu.trade.work_precision import (
+    ACCURACIES,
+    Setting,
+    end_error,
+    holding_costs,
+    observed_orders,
+    planned,
+    settings,
+    timed_bare,
+)
+from tests.conftest import ROOT
+
+RESULTS = ROOT / "hovercraft_fmu" / "fmu" / "documentation" / "results"
+
+
+def records(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_reference_is_that_of_the_closed_form() -> None:
+    """The solver, on scenes whose closed form it is not told, agrees to its tolerance."""
+    from dataclasses import replace
+
+    for name in ("launch", "coast", "cycloid"):
+        exact, _ = reference_end(SCENES[name], 60.0)
+        solved, uncertainty = reference_end(replace(SCENES[name], exact=None), 60.0)
+        assert solved == pytest.approx(exact, abs=1e-9)
+        assert uncertainty < 1e-7
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_reference_is_sharp_enough_for_every_accuracy_advised(name: str) -> None:
+    _, uncertainty = reference_end(SCENES[name], 60.0)
+    assert uncertainty < 0.01 * min(ACCURACIES)
+
+
+def test_observed_orders() -> None:
+    orders = {(each.scene, each.integrator): each.slope for each in observed_orders()}
+    for scene in ("launch", "cycloid"):
+        assert orders[scene, "semi_implicit_euler"] == pytest.approx(1.0, abs=0.1)
+        assert orders[scene, "drag_implicit"] == pytest.approx(1.0, abs=0.1)
+        assert orders[scene, "rk4"] == pytest.approx(4.0, abs=0.1)
+    assert orders["stop", "rk4"] < 3.0  # the kink at rest
+
+
+def test_holding_costs_a_first_order() -> None:
+    holding = holding_costs()
+    steps, errors = zip(*holding, strict=True)
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_millimetre_on_turn() -> None:
+    """The default meets it; RK4 meets it with a five-hundredth of the sub-steps."""
+    exact, _ = reference_end(SCENES["turn"], 60.0)
+    for setting, most in ((Setting("semi_implicit_euler", 0.001, 0.5), 60000), (Setting("rk4", 0.5, 0.5), 120)):
+        run = planned(SCENES["turn"], setting)
+        _, end, count = timed_bare(run, list(schedule(run)))
+        assert math.hypot(end.x - exact.x, end.y - exact.y) <= 1e-3
+        assert count == most
+
+
+def test_the_error_of_adaptive_follows_its_tolerance_on_every_held_scene() -> None:
+    """Over six decades; at most a thousand times the tolerance at the end of a minute of hundreds of steps."""
+    for name in ("launch", "coast", "cycloid", "turn", "stop"):
+        exact, _ = reference_end(SCENES[name], 60.0)
+        for setting in settings(0.5)[-7:]:
+            error = end_error(SCENES[name], setting, exact)
+            assert error <= 1e3 * setting.tolerance + 1e-9, (name, setting)
+
+
+def test_the_command(tmp_path: Path) -> None:
+    done = CliRunner().invoke(commands, ["trade", "--quick", "--output", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    rows, advice = records(tmp_path / "work_precision.csv"), records(tmp_path / "advice.csv")
+    assert {row["integrator"] for row in rows} == {"semi_implicit_euler", "drag_implicit", "rk4", "adaptive"}
+    assert [float(row["accuracy_m"]) for row in advice] == list(ACCURACIES)
+    assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in advice)
+    assert all(float(row["fmu_cost"]) > 0.0 < float(row["bare_cost"]) for row in rows)
+    assert all((tmp_path / name).stat().st_size > 10000 for name in ("work_precision.png", "holding.png"))
+    # what is committed was written by the same command, and tells the same of the errors
+    for ours, committed in zip(advice, records(RESULTS / "advice.csv"), strict=True):
+        assert float(committed["position_error"]) <= float(committed["accuracy_m"])
+        assert ours.keys() == committed.keys()
+
+
+def test_the_readme_shows_the_committed_advice() -> None:
+    assert (RESULTS / "advice.md").read_text(encoding="utf-8") in (ROOT / "README.md").read_text(encoding="utf-8")
