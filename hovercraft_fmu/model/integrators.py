@@ -269,9 +269,9 @@ class Integrator(NamedTuple):
     integrate: Integrate | None
     """None for the adaptive method, which cuts the time itself."""
     stability_limit: float
-    """1: the largest sub-step times the fastest linearized drag rate at which answers can be right."""
+    """1: the largest sub-step times the fastest linearized drag rate up to which answers can be trusted."""
     rotation_limit: float
-    """rad: the largest turn in a sub-step at which they can."""
+    """rad: the largest turn in a sub-step up to which they can. Both are measured: hovercraft-fmu stability."""
 
 
 INTEGRATORS = (
@@ -286,7 +286,7 @@ INTEGRATORS = (
         "drag_implicit",
         "Drag solved implicitly with its factor from the start of the sub-step: first order, stable at any step",
         drag_implicit,
-        math.inf,
+        2.0,  # it never diverges, but under thrust it overshoots above
         0.5,
     ),
     Integrator("rk4", "The classic Runge-Kutta method: fourth order", rk4, 2.785, 0.5),
