@@ -12,9 +12,9 @@ from hovercraft_fmu.cli import commands
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import schedule
 from hovercraft_fmu.trade.reference import reference_end
+from hovercraft_fmu.trade.rows import Setting
 from hovercraft_fmu.trade.work_precision import (
     ACCURACIES,
-    Setting,
     end_error,
     holding_costs,
     observed_orders,

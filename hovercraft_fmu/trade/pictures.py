@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..view.plots import new_figure
-
-if TYPE_CHECKING:
-    from .work_precision import Holding, Row
+from .rows import Holding, Row
 
 STYLES = {
     "semi_implicit_euler": ("#0b4f6c", "o"),
@@ -18,7 +15,7 @@ STYLES = {
 """Colour and marker of each method."""
 
 
-def draw_work_precision(rows: "Sequence[Row]", path: Path) -> None:
+def draw_work_precision(rows: Sequence[Row], path: Path) -> None:
     """Position error against cost: a panel a scene, at the longest communication step; bare and through fmpy."""
     scenes = list(dict.fromkeys(row.scene for row in rows))
     longest = max(row.communication_step for row in rows)
@@ -46,7 +43,7 @@ def draw_work_precision(rows: "Sequence[Row]", path: Path) -> None:
     figure.savefig(path, format="png", metadata={"Software": None})
 
 
-def draw_holding(holding: "Sequence[Holding]", path: Path) -> None:
+def draw_holding(holding: Sequence[Holding], path: Path) -> None:
     """Position error against the communication step, log-log."""
     figure = new_figure(figsize=(6.0, 4.2), dpi=110, layout="constrained")
     axes = figure.add_subplot()

@@ -40,7 +40,6 @@ The constant is 1 in both: of some 10^5 runs the worst needs 0.52 for the first 
 """
 
 import csv
-import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -56,6 +55,7 @@ from ..model.craft import Craft
 from ..model.dynamics import Controls, State, actuation, drag_per_speed, load_function
 from ..model.integrators import INTEGRATORS, Integrate, Integrator, rk4
 from ..model.subcycling import stability_number
+from ..view.plots import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -586,7 +586,7 @@ def run(folder: Path, progress: Progress | None = None) -> Group:
     Raises:
         ModuleNotFoundError: matplotlib is not installed; OSError: a file cannot be written.
     """
-    figure = _figure(figsize=(15.0, 5.2), dpi=110, layout="constrained")  # what is missing is missing at once
+    figure = new_figure(figsize=(15.0, 5.2), dpi=110, layout="constrained")  # what is missing is missing at once
     folder.mkdir(parents=True, exist_ok=True)
     report = progress or _nothing
     limits = measure_map(lambda done: report(0.5 * done))
@@ -675,17 +675,6 @@ NOTES: Mapping[tuple[float, float], str] = MappingProxyType(
 """What is seen where, in the first panel."""
 SHOWN = 4000
 """Dots a method."""
-
-
-def _figure(**options: Any) -> "Figure":
-    try:
-        module = importlib.import_module("matplotlib.figure")
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            "pictures need matplotlib, which is not installed: pip install 'hovercraft-fmu[plot]'"
-        ) from error
-    figure: Figure = module.Figure(**options)
-    return figure
 
 
 def draw(figure: "Figure", extremes: Extremes) -> None:

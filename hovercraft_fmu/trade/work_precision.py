@@ -7,7 +7,7 @@ import platform
 import statistics
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -26,7 +26,9 @@ from ..model.subcycling import advance
 from ..scenes import SCENES, Scene
 from ..simulation import Run, Value, instantiated, plan, read_description, schedule
 from ..view.tables import markdown
+from .pictures import draw_holding, draw_work_precision
 from .reference import reference_end
+from .rows import Holding, Row, Setting
 
 STOP_TIME = 60.0
 """s"""
@@ -49,50 +51,6 @@ REPEATS = 3
 
 Tell = Callable[[float], None]
 """Called with the part of the work that is done, 0 to 1."""
-
-
-class Setting(NamedTuple):
-    """What a user chooses."""
-
-    integrator: str
-    step_size: float
-    """s; of the adaptive method the first step"""
-    communication_step: float
-    """s"""
-    tolerance: float = 1e-6
-
-    @property
-    def label(self) -> str:
-        """The method and what drives its accuracy."""
-        by = f"tolerance {self.tolerance:g}" if self.integrator == "adaptive" else f"{self.step_size:g} s"
-        return f"{self.integrator}, {by}"
-
-
-@dataclass(frozen=True)
-class Row:
-    """One scene with one setting."""
-
-    scene: str
-    integrator: str
-    step_size: float
-    tolerance: float
-    communication_step: float
-    position_error: float
-    """m, at the end"""
-    heading_error: float
-    """rad, at the end"""
-    reference_uncertainty: float
-    """of the largest component, SI units"""
-    bare_cost: float
-    """us a simulated second"""
-    fmu_cost: float
-    """us a simulated second, through fmpy"""
-    substeps: int
-
-    @property
-    def setting(self) -> Setting:
-        """The choice of this row."""
-        return Setting(self.integrator, self.step_size, self.communication_step, self.tolerance)
 
 
 def settings(communication_step: float) -> list[Setting]:
@@ -318,15 +276,6 @@ def end_error(scene: Scene, setting: Setting, exact: State) -> float:
     return max(abs(a - b) for a, b in zip(end, exact, strict=True))
 
 
-class Holding(NamedTuple):
-    """What holding the inputs from one communication point to the next costs."""
-
-    communication_step: float
-    """s"""
-    position_error: float
-    """m, at the end"""
-
-
 def holding_costs() -> list[Holding]:
     """On the scene whose inputs change all the time, with RK4 at 0.01 s, whose own error is far below."""
     scene = SCENES[HELD_SCENE]
@@ -344,8 +293,6 @@ def holding_costs() -> list[Holding]:
 
 def run(folder: Path, quick: bool = False, tell: Tell = lambda _: None) -> Group:
     """Measure, write CSV and pictures into the folder, and return what is to be printed."""
-    from .pictures import draw_holding, draw_work_precision
-
     folder.mkdir(parents=True, exist_ok=True)
     rows = measure(quick, tell)
     advice, orders, holding = advise(rows, quick), observed_orders(), holding_costs()
