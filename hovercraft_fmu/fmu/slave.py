@@ -60,7 +60,7 @@ SUBSTEPS = BY_NAME["substeps"].reference
 WARNED = BY_NAME["warnings"].reference
 TOLERANCE = BY_NAME["tolerance"].reference
 PROJECTED_AREA = BY_NAME["projected_area"].reference
-KEPT_REALS = (*(v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES),)
+KEPT_REALS = tuple(v.reference for v in VARIABLES if v.kind == "Real" and v.start is not None and v.name not in STATES)
 """What is kept as the host set it: inputs and parameters."""
 DIGEST_SIZE = 64
 """Bytes of the hexadecimal SHA-256 ahead of a serialized state."""
