@@ -14,6 +14,7 @@ from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator, integrator_number
 from hovercraft_fmu.model.subcycling import Settings, advance, stability_number
 from hovercraft_fmu.scenes import COAST_SPEED, SCENES
+from hovercraft_fmu.trade.benchmark import reference_loop
 from tests.strategies import controls, crafts, numbers, states
 from tests.test_scenes import EXACT, NAMES
 
@@ -175,3 +176,10 @@ def test_rk4_beats_both_first_order_methods() -> None:
     reference = end("rk4", 0.001)
     errors = {name: math.dist(end(name, 0.1)[:2], reference[:2]) for name in ORDERS}
     assert errors["rk4"] < 1e-3 * min(errors["drag_implicit"], errors["semi_implicit_euler"])
+
+
+def test_the_reference_loop_of_the_benchmark_has_the_bits_of_the_default() -> None:
+    """What the benchmark compares with is the same arithmetic, written out in one loop."""
+    asked, craft = Controls(5.0, 0.5, 0.2), Craft()
+    start = State(1.0, -2.0, 0.3, 0.4, -0.1, 0.05)
+    assert reference_loop(start, asked, craft, 5000) == advance(start, asked, craft, 5.0).state
