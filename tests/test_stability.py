@@ -18,7 +18,7 @@ from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, STATES, STEP_TURNS, STEP_UNSTABLE
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
-from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator, integrator_number
+from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator_number
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, stability_number
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.trade.stability import (
@@ -37,7 +37,9 @@ from hovercraft_fmu.trade.stability import (
     cases,
     chosen,
     judge,
+    largest_first_step,
     largest_step,
+    measure_adaptive,
     measure_extremes,
     sample,
     shares,
@@ -150,31 +152,18 @@ def test_the_command(tmp_path: Path) -> None:
 
 
 def test_the_adaptive_method_meets_its_tolerance_or_says_that_it_cannot() -> None:
-    """Over four of the craft's own times, against a tolerance a thousand times as sharp.
+    share = measure_adaptive()
+    assert share.silent == 0.0
+    assert share.accurate > 0.95
+    assert share.failed < 0.05
+    assert share.wrong == 0.0
 
-    n steps of an error below the tolerance; a heading that is off by it turns a velocity V off by V times as much.
-    """
-    tolerance, loud = 1e-5, 0
-    runs = sample(np.random.default_rng(5), 1000, 4, list(SAMPLINGS)[1])
-    method = integrator(integrator_number("adaptive"))
-    for i in range(1000):
-        one_run = chosen(runs, [i])
-        craft = Craft(**{name: float(getattr(one_run.craft, name)[0]) for name in CRAFT_PARAMETERS})
-        asked = Controls(*(float(np.asarray(value)[0]) for value in one_run.controls))
-        start = State(*(float(np.asarray(value)[0]) for value in one_run.start))
-        duration = 4.0 * float(runs.h[i])
-        try:
-            coarse, fine = (
-                advance(start, asked, craft, duration, Settings(duration, method, each))
-                for each in (tolerance, 1e-3 * tolerance)
-            )
-        except (StepTooSmallError, NonFiniteError):
-            loud += 1
-            continue
-        speed = max(1.0, math.hypot(start.vx, start.vy), math.hypot(fine.state.vx, fine.state.vy))
-        error = max(abs(a - b) for a, b in zip(coarse.state[2:], fine.state[2:], strict=True))
-        assert error <= 10.0 * coarse.substeps * tolerance * speed, i
-    assert loud < 50
+
+def test_the_adaptive_method_takes_any_first_step() -> None:
+    for case in cases():
+        for limits in largest_first_step(case).values():
+            assert len(limits) >= 3
+            assert all(limit == math.inf for limit in limits)
 
 
 # ---- the same on the real FMU

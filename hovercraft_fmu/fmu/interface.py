@@ -181,12 +181,10 @@ VARIABLES: tuple[Variable, ...] = (
              "For the adaptive integrator: largest error of a step, of any component of the state, in SI units; a "
              "tolerance that the host gives with the experiment wins", minimum=0.0, nominal=1e-6),
     Variable(37, "stability_number", "local", "continuous", "1", None,
-             "Largest seen so far (start, end and about six sub-steps of a communication step) of sub-step * "
-             "2*k*q*(1/mass + x_d^2/inertia), the fastest linearized drag rate; the "
-             "classical limits are 2 for Euler, 2.785 for RK4", minimum=0.0),
+             "Largest so far, over every sub-step, of sub-step * 2*k*q*(1/mass + x_d^2/inertia), the fastest "
+             "linearized drag rate; the classical limits are 2 for Euler, 2.785 for RK4", minimum=0.0),
     Variable(38, "rotation_per_substep", "local", "continuous", "rad", None,
-             "Largest turn in a sub-step seen so far, looked at like stability_number: |yaw rate| * sub-step",
-             minimum=0.0),
+             "Largest turn in a sub-step so far, over every sub-step: |yaw rate| * sub-step", minimum=0.0),
 )  # fmt: skip
 
 BY_NAME: Mapping[str, Variable] = MappingProxyType({variable.name: variable for variable in VARIABLES})

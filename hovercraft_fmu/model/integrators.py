@@ -17,28 +17,15 @@ class Stretch(NamedTuple):
     state: State
     substeps: int
     drag: float
-    """kg: the largest h*k*q seen (some six times, and at the end); 0 for arrays of craft"""
+    """kg: the largest h*k*q, wherever the loads were worked out and at the end"""
     rotation: float
-    """rad: the largest |yaw rate|*h seen (some six times, and at the end); 0 for arrays of craft"""
+    """rad: the largest |yaw rate|*h, there too"""
     proposed: float = 0.0
     """s: the step that the adaptive method would take next; 0 for the others"""
 
 
 Integrate: TypeAlias = Callable[[State, Controls, Craft, float, int, Namespace], Stretch]
 """(state, controls, craft, sub-step h [s], number of sub-steps n, namespace) -> after n*h."""
-
-
-def _blocks(n: int) -> list[int]:
-    """n sub-steps in about six blocks: what is watched is looked at after each, not in every sub-step.
-
-    The first block is one sub-step, for the start; the others are odd, so that both sides of an oscillation from
-    sub-step to sub-step are seen.
-    """
-    if n <= 1:
-        return [n]
-    size = n // 5 | 1
-    whole, rest = divmod(n - 1, size)
-    return [1, *[size] * whole, *([rest] if rest else [])]
 
 
 def semi_implicit_euler(
@@ -51,25 +38,28 @@ def semi_implicit_euler(
     loads_at = load_function(controls, craft, ns)
     mass, inertia, single = craft.mass, craft.inertia, ns is math
     x, y, heading, vx, vy, yaw_rate = state
-    most, fastest = 0.0, abs(yaw_rate) if single else 0.0
-    for block in _blocks(n):
-        for _ in range(block):
-            force_x, force_y, moment, kq = loads_at(heading, vx, vy, yaw_rate)
-            # `a = a + b`, never `a += b`: that would write into the caller's arrays
-            vx = vx + h * (force_x / mass)
-            vy = vy + h * (force_y / mass)
-            x = x + h * vx
-            y = y + h * vy
-            yaw_rate = yaw_rate + h * (moment / inertia)
-            heading = heading + h * yaw_rate
+    most, left, right = 0.0, yaw_rate, yaw_rate
+    for _ in range(n):
+        force_x, force_y, moment, kq = loads_at(heading, vx, vy, yaw_rate)
+        # `a = a + b`, never `a += b`: that would write into the caller's arrays
+        vx = vx + h * (force_x / mass)
+        vy = vy + h * (force_y / mass)
+        x = x + h * vx
+        y = y + h * vy
+        yaw_rate = yaw_rate + h * (moment / inertia)
+        heading = heading + h * yaw_rate
         if single:
             if kq > most:
                 most = kq
-            if not -fastest <= yaw_rate <= fastest:
-                fastest = abs(yaw_rate)
-    if single:
-        most = max(most, loads_at(heading, vx, vy, yaw_rate)[3])
-    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * fastest)
+            if yaw_rate > right:
+                right = yaw_rate
+            elif yaw_rate < left:
+                left = yaw_rate
+        else:
+            most, left, right = ns.fmax(most, kq), ns.fmin(left, yaw_rate), ns.fmax(right, yaw_rate)
+    largest = max if single else ns.fmax
+    most = largest(most, loads_at(heading, vx, vy, yaw_rate)[3])
+    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * largest(right, -left))
 
 
 def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math) -> Stretch:
@@ -92,33 +82,36 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     mass, inertia, x_d = craft.mass, craft.inertia, craft.drag_center
     spread = inertia + mass * x_d * x_d
     x, y, heading, vx, vy, yaw_rate = state
-    most, fastest = 0.0, abs(yaw_rate) if single else 0.0
-    for block in _blocks(n):
-        for _ in range(block):
-            kq = loads_at(heading, vx, vy, yaw_rate)[3]
-            c = cos(heading)
-            s = sin(heading)
-            g = h * kq
-            surge = (mass * (c * vx + s * vy) + h * thrust) / (mass + g)
-            a = mass * (c * vy - s * vx) + h * side
-            b = inertia * yaw_rate + h * turn
-            e = x_d * a - b
-            determinant = mass * inertia + g * spread
-            sway = (inertia * a + g * x_d * e) / determinant
-            yaw_rate = (mass * b - g * e) / determinant
-            vx = c * surge - s * sway
-            vy = s * surge + c * sway
-            x = x + h * vx
-            y = y + h * vy
-            heading = heading + h * yaw_rate
+    most, left, right = 0.0, yaw_rate, yaw_rate
+    for _ in range(n):
+        kq = loads_at(heading, vx, vy, yaw_rate)[3]
+        c = cos(heading)
+        s = sin(heading)
+        g = h * kq
+        surge = (mass * (c * vx + s * vy) + h * thrust) / (mass + g)
+        a = mass * (c * vy - s * vx) + h * side
+        b = inertia * yaw_rate + h * turn
+        e = x_d * a - b
+        determinant = mass * inertia + g * spread
+        sway = (inertia * a + g * x_d * e) / determinant
+        yaw_rate = (mass * b - g * e) / determinant
+        vx = c * surge - s * sway
+        vy = s * surge + c * sway
+        x = x + h * vx
+        y = y + h * vy
+        heading = heading + h * yaw_rate
         if single:
             if kq > most:
                 most = kq
-            if not -fastest <= yaw_rate <= fastest:
-                fastest = abs(yaw_rate)
-    if single:
-        most = max(most, loads_at(heading, vx, vy, yaw_rate)[3])
-    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * fastest)
+            if yaw_rate > right:
+                right = yaw_rate
+            elif yaw_rate < left:
+                left = yaw_rate
+        else:
+            most, left, right = ns.fmax(most, kq), ns.fmin(left, yaw_rate), ns.fmax(right, yaw_rate)
+    largest = max if single else ns.fmax
+    most = largest(most, loads_at(heading, vx, vy, yaw_rate)[3])
+    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * largest(right, -left))
 
 
 def rk4(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math) -> Stretch:
@@ -131,33 +124,37 @@ def rk4(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Na
     mass, inertia, single = craft.mass, craft.inertia, ns is math
     half, sixth, square = 0.5 * h, h / 6.0, h * h / 6.0
     x, y, heading, vx, vy, yaw_rate = state
-    most, fastest = 0.0, abs(yaw_rate) if single else 0.0
-    for block in _blocks(n):
-        for _ in range(block):
-            fx1, fy1, m1, kq = loads_at(heading, vx, vy, yaw_rate)
-            fx1, fy1, m1 = fx1 / mass, fy1 / mass, m1 / inertia
-            r2 = yaw_rate + half * m1
-            fx2, fy2, m2, _kq = loads_at(heading + half * yaw_rate, vx + half * fx1, vy + half * fy1, r2)
-            fx2, fy2, m2 = fx2 / mass, fy2 / mass, m2 / inertia
-            r3 = yaw_rate + half * m2
-            fx3, fy3, m3, _kq = loads_at(heading + half * r2, vx + half * fx2, vy + half * fy2, r3)
-            fx3, fy3, m3 = fx3 / mass, fy3 / mass, m3 / inertia
-            r4 = yaw_rate + h * m3
-            fx4, fy4, m4, _kq = loads_at(heading + h * r3, vx + h * fx3, vy + h * fy3, r4)
-            x = x + h * vx + square * (fx1 + fx2 + fx3)
-            y = y + h * vy + square * (fy1 + fy2 + fy3)
-            heading = heading + h * yaw_rate + square * (m1 + m2 + m3)
-            vx = vx + sixth * (fx1 + 2.0 * fx2 + 2.0 * fx3 + fx4 / mass)
-            vy = vy + sixth * (fy1 + 2.0 * fy2 + 2.0 * fy3 + fy4 / mass)
-            yaw_rate = yaw_rate + sixth * (m1 + 2.0 * m2 + 2.0 * m3 + m4 / inertia)
+    most, left, right = 0.0, yaw_rate, yaw_rate
+    for _ in range(n):
+        fx1, fy1, m1, kq1 = loads_at(heading, vx, vy, yaw_rate)
+        fx1, fy1, m1 = fx1 / mass, fy1 / mass, m1 / inertia
+        r2 = yaw_rate + half * m1
+        fx2, fy2, m2, kq2 = loads_at(heading + half * yaw_rate, vx + half * fx1, vy + half * fy1, r2)
+        fx2, fy2, m2 = fx2 / mass, fy2 / mass, m2 / inertia
+        r3 = yaw_rate + half * m2
+        fx3, fy3, m3, kq3 = loads_at(heading + half * r2, vx + half * fx2, vy + half * fy2, r3)
+        fx3, fy3, m3 = fx3 / mass, fy3 / mass, m3 / inertia
+        r4 = yaw_rate + h * m3
+        fx4, fy4, m4, kq4 = loads_at(heading + h * r3, vx + h * fx3, vy + h * fy3, r4)
+        x = x + h * vx + square * (fx1 + fx2 + fx3)
+        y = y + h * vy + square * (fy1 + fy2 + fy3)
+        heading = heading + h * yaw_rate + square * (m1 + m2 + m3)
+        vx = vx + sixth * (fx1 + 2.0 * fx2 + 2.0 * fx3 + fx4 / mass)
+        vy = vy + sixth * (fy1 + 2.0 * fy2 + 2.0 * fy3 + fy4 / mass)
+        yaw_rate = yaw_rate + sixth * (m1 + 2.0 * m2 + 2.0 * m3 + m4 / inertia)
         if single:
-            if kq > most:
-                most = kq
-            if not -fastest <= yaw_rate <= fastest:
-                fastest = abs(yaw_rate)
-    if single:
-        most = max(most, loads_at(heading, vx, vy, yaw_rate)[3])
-    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * fastest)
+            if not (kq1 <= most and kq2 <= most and kq3 <= most and kq4 <= most):
+                most = max(most, kq1, kq2, kq3, kq4)
+            if not (left <= r2 <= right and left <= r3 <= right and left <= r4 <= right and left <= yaw_rate <= right):
+                left, right = min(left, r2, r3, r4, yaw_rate), max(right, r2, r3, r4, yaw_rate)
+        else:
+            for kq in (kq1, kq2, kq3, kq4):
+                most = ns.fmax(most, kq)
+            for rate in (r2, r3, r4, yaw_rate):
+                left, right = ns.fmin(left, rate), ns.fmax(right, rate)
+    largest = max if single else ns.fmax
+    most = largest(most, loads_at(heading, vx, vy, yaw_rate)[3])
+    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * largest(right, -left))
 
 
 # Dormand, Prince: A family of embedded Runge-Kutta formulae (1980), the pair 5(4) with 7 stages; the last is the fifth

@@ -18,16 +18,17 @@ mass nor air nor thrust is left in a step, so the limits are the same numbers fo
 
 The stability number of the FMU is sigma = h*2*k*q*(1/m + x_d^2/I): 2*x straight ahead with x_d = 0, and in a spin.
 
-THE EXTREMES. Random craft, far beyond the sensible. N sub-steps of h; the largest over their starts and the end of
+THE EXTREMES. Random craft, far beyond the sensible. N sub-steps of h; the largest of
 
     sigma = h*2*k*q*(1/m + x_d^2/I)        drag: the stability number
     rho = h*|r|                            rotation in a sub-step
     tau = h^2*(k*q^2*|x_d| + |turn|)/I     what the air, were it abeam, and the thrusters' moment (turn) can add to it
     alpha = h*(gain of speed by thrust and thrusters)/V
 
-and V, the largest speed of the centre of gravity, or of the drag point about it (|x_d*r|). All of sigma, rho, sqrt(tau)
-and alpha are proportional to h: rates of the motion times the sub-step. Drag is minus the slope of the convex function
-k*q^3/3, so at a held heading two motions never drift apart by it, and local errors add up without growing.
+wherever the loads are worked out (RK4's stages, too) and at the end, and V, the largest speed of the centre of gravity,
+or of the drag point about it (|x_d*r|). All of sigma, rho, sqrt(tau) and alpha are proportional to h: rates of the
+motion times the sub-step. Drag is minus the slope of the convex function k*q^3/3, so at a held heading two motions
+never drift apart by it, and local errors add up without growing.
 
 - First order: a sub-step leaves h^2/2*|v''|. Drag and direction change by delta = sigma + rho + tau of themselves, what
   they act on by delta + alpha of V. So the error is at most C*N*delta*(delta + alpha)*V, where C = 1/2 is Taylor's.
@@ -35,11 +36,16 @@ k*q^3/3, so at a held heading two motions never drift apart by it, and local err
   point passes through rest q has a kink, and one sub-step errs by sigma*eps^2*V, of third order. So the error is
   at most C*(N*lambda*eps^4 + sigma*eps^2)*V. (sqrt(tau) is the rate at which the craft swings about its course, as a
   weathervane does, times h.)
+- Adaptive: each of its N steps errs by less than the tolerance, in SI units; a heading that is off by it turns a
+  velocity V off by V times as much. So the error is at most C*N*tolerance*max(1, V), C = 10. Its steps are its
+  own: h is the first one, and is not in the bound.
 
-The constant is 1 in both: of some 10^5 runs the worst needs 0.52 for the first order, 0.19 for RK4.
+The constant is 1 in the first two: of some 10^5 runs the worst needs 0.50 for the first order, 0.07 for RK4.
 """
 
 import csv
+import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -52,9 +58,18 @@ from rich.console import Group
 from rich.table import Table
 
 from ..model.craft import Craft
-from ..model.dynamics import Controls, State, actuation, drag_per_speed, load_function
-from ..model.integrators import INTEGRATORS, Integrate, Integrator, rk4
-from ..model.subcycling import stability_number
+from ..model.dynamics import Controls, State, actuation, drag_per_speed
+from ..model.integrators import (
+    INTEGRATORS,
+    MIN_STEP,
+    Integrate,
+    Integrator,
+    StepTooSmallError,
+    integrator,
+    integrator_number,
+    rk4,
+)
+from ..model.subcycling import NonFiniteError, Settings, advance, stability_number
 from ..view.plots import new_figure
 
 if TYPE_CHECKING:
@@ -239,6 +254,55 @@ def largest_step(case: Case, method: Integrator, quality: str) -> Array:
     return np.where(right.all(axis=1), np.inf, 0.5 * (x[craft, failed - 1] + x[craft, failed]))
 
 
+FIRST_STEPS = (0.02, 0.5, 1.5, 3.0, 30.0, 1e3, 1e6)
+"""Dimensionless first steps of the adaptive method."""
+UNITS = 30
+"""Of the case's own time, that it runs on; a communication point after each."""
+ADAPTIVE = integrator(integrator_number("adaptive"))
+
+
+def largest_first_step(case: Case) -> dict[str, list[float]]:
+    """For each quality and craft: the largest of FIRST_STEPS up to which the adaptive method has it; infinite for all.
+
+    Left out are craft whose whole time is so short that the smallest step, 1e-12 s, is no small part of it: there the
+    method refuses loudly.
+    """
+    table: dict[str, list[float]] = {quality: [] for quality in QUALITIES}
+    for i in np.flatnonzero(case.unit > 1e4 * MIN_STEP):
+        right = [adaptive_qualities(case, int(i), x) for x in FIRST_STEPS]
+        for quality, column in zip(QUALITIES, zip(*right, strict=True), strict=True):
+            good = [x for x, right in zip(FIRST_STEPS, column, strict=True) if right]
+            table[quality].append(math.inf if len(good) == len(FIRST_STEPS) else max(good, default=0.0))
+    return table
+
+
+def adaptive_qualities(case: Case, i: int, x: float) -> tuple[bool, bool, bool]:
+    """Monotone, stable, bounded: one craft of the case with a first step, at a tolerance of 1e-9 of the scale."""
+    runs = lanes(case._replace(unit=x * case.unit), np.ones((len(case.scale), 1)), _first(case))
+    craft, controls, state = single(runs, i)
+    settings = Settings(x * float(case.unit[i]), ADAPTIVE, 1e-9 * float(case.scale[i]))
+    proposed, gaps = 0.0, [1.0]
+    one = case._replace(scale=case.scale[i : i + 1])
+    for _ in range(UNITS):
+        stretch = advance(state, controls, craft, float(case.unit[i]), settings, proposed=proposed)
+        state, proposed = stretch.state, stretch.proposed
+        arrays = State(*cast(Iterator[Array], map(np.atleast_1d, state)))
+        speed = float(speed_of(one, arrays, chosen(runs, [i]), (1, 1))[0, 0])
+        gaps.append((speed - _goal(case)) / (_first(case) - _goal(case)))
+    slack = 1e-8 * UNITS / abs(_first(case) - _goal(case))  # some steps' errors, in units of the gap
+    steps = list(itertools.pairwise(gaps))
+    monotone = all(new <= old + slack and new >= -slack for old, new in steps)
+    return monotone, abs(gaps[-1]) < 0.999, max(map(abs, gaps)) < RUNAWAY
+
+
+def single(runs: Runs, i: int) -> tuple[Craft, Controls, State]:
+    """One of the runs, in plain floats."""
+    one = chosen(runs, [i])
+    craft = Craft(**{each.name: float(getattr(one.craft, each.name)[0]) for each in fields(Craft)})
+    controls, start = ([float(np.asarray(value)[0]) for value in values] for values in (one.controls, one.start))
+    return craft, Controls(*controls), State(*start)
+
+
 THEORY: Mapping[tuple[str, str], tuple[float, float, float]] = MappingProxyType(
     {
         ("semi_implicit_euler", "coasting"): (1.0, 2.0, 2.0),
@@ -281,6 +345,9 @@ def measure_map(progress: Progress | None = None) -> list[Limit]:
                 rows.append(Limit(method.name, case.name, quality, float(x.min()), float(x.max()), expected))
             if progress:
                 progress((i * len(all_cases) + j + 1) / (len(FIXED) * len(all_cases)))
+    for case in all_cases:
+        for quality, limits in largest_first_step(case).items():
+            rows.append(Limit(ADAPTIVE.name, case.name, quality, min(limits), max(limits), math.inf))
     return rows
 
 
@@ -373,17 +440,15 @@ class Outcome(NamedTuple):
 
 def carry_out(runs: Runs, method: Integrator) -> Outcome:
     """Make all sub-steps, and watch."""
-    state, craft, h = runs.start, runs.craft, runs.h
-    loads_at, step = load_function(runs.controls, craft, np), steps_of(method)
-    drag = rho = speed = np.zeros_like(h)
+    state, craft, h, step = runs.start, runs.craft, runs.h, steps_of(method)
+    drag = rho = np.zeros_like(h)
+    speed = _size(state.vx, state.vy, state.yaw_rate, craft)
     finite = np.ones(h.shape, bool)
     with np.errstate(all="ignore"):
-        for n in range(runs.substeps + 1):
-            if n:
-                state = step(state, runs.controls, craft, h, 1, np).state
-            kq = loads_at(*state[2:])[3]
-            drag = np.fmax(drag, h * kq)
-            rho = np.fmax(rho, h * np.abs(state.yaw_rate))
+        for _ in range(runs.substeps):
+            stretch = step(state, runs.controls, craft, h, 1, np)
+            state = stretch.state
+            drag, rho = np.fmax(drag, stretch.drag), np.fmax(rho, stretch.rotation)
             speed = np.fmax(speed, _size(state.vx, state.vy, state.yaw_rate, craft))
             finite &= np.isfinite(np.sum(state, axis=0))
         sigma = stability_number(drag, craft)
@@ -546,6 +611,54 @@ def measure_extremes(runs: int = 98304, seed: int = 1, progress: Progress | None
     return result
 
 
+TOLERANCE = 1e-5
+ADAPTIVE_RUNS = 1000
+OWN_TIMES = 4
+"""Times the sampled step: how long a run of the adaptive method lasts."""
+
+
+def measure_adaptive(runs: int = ADAPTIVE_RUNS, seed: int = 5) -> Share:
+    """Random extremes with the adaptive method, against itself at a tolerance a thousand times as sharp."""
+    sampling = list(SAMPLINGS)[1]
+    drawn = sample(np.random.default_rng(seed), runs, OWN_TIMES, sampling)
+    rows = [_adaptive_run(drawn, i) for i in range(runs)]
+    made = np.array([row for row in rows if row is not None])
+    error, bound, substeps, doubt = made.T
+    right = error <= bound
+    return Share(
+        ADAPTIVE.name,
+        sampling,
+        runs,
+        int(substeps.sum()),
+        failed=1.0 - len(made) / runs,
+        warned=0.0,
+        accurate=float(np.sum(right & (bound < 1.0))) / runs,
+        silent=float(np.sum(~right)) / runs,
+        vague=float(np.sum(right & (bound >= 1.0))) / runs,
+        wrong=float(np.sum(error > 0.1)) / runs,
+        worst=float(np.max(error / bound)),
+        doubt=float(np.max(doubt)),
+    )
+
+
+def _adaptive_run(runs: Runs, i: int) -> tuple[float, float, int, float] | None:
+    """Error and bound [1, of V], steps, and the sharper run's bound in units of this; None: it was refused."""
+    craft, controls, start = single(runs, i)
+    first = float(runs.h[i])
+    try:
+        coarse, fine = (
+            advance(start, controls, craft, OWN_TIMES * first, Settings(first, ADAPTIVE, tolerance))
+            for tolerance in (TOLERANCE, 1e-3 * TOLERANCE)
+        )
+    except (StepTooSmallError, NonFiniteError):
+        return None
+    speed = max(float(_size(each.vx, each.vy, each.yaw_rate, craft)) for each in (start, fine.state))
+    error = float(_difference(coarse.state, fine.state, craft))
+    scale = speed if speed > 0.0 else 1.0
+    bound = 10.0 * coarse.substeps * TOLERANCE * max(1.0, speed) / scale
+    return error / scale, bound, coarse.substeps, 1e-3 * fine.substeps / coarse.substeps
+
+
 def shares(extremes: Extremes) -> list[Share]:
     """The table."""
     return [_share(*key, batches) for key, batches in sorted(extremes.items(), key=lambda item: _place(item[0]))]
@@ -591,7 +704,7 @@ def run(folder: Path, progress: Progress | None = None) -> Group:
     report = progress or _nothing
     limits = measure_map(lambda done: report(0.5 * done))
     extremes = measure_extremes(progress=lambda done: report(0.5 + 0.45 * done))
-    rows = shares(extremes)
+    rows = [*shares(extremes), measure_adaptive()]
     _write(folder / "stability.csv", limits)
     _write(folder / "extremes.csv", rows)
     draw(figure, extremes)
@@ -603,6 +716,7 @@ def run(folder: Path, progress: Progress | None = None) -> Group:
         "Random extremes; share of the runs:",
         extremes_table(rows),
         *(f"bound of {name}: {each.constant:g}*{each.text}" for name, each in FORMULAS.items()),
+        f"bound of {ADAPTIVE.name}: 10*N*tolerance*max(1, V) of its N steps; tolerance = {TOLERANCE:g}",
     )
 
 
@@ -623,7 +737,7 @@ def map_table(limits: list[Limit]) -> Table:
     table = Table(box=None, pad_edge=False)
     for title in ("method", "motion", *(f"{quality} up to" for quality in QUALITIES), "as stability_number", "theory"):
         table.add_column(title)
-    for method in FIXED:
+    for method in INTEGRATORS:
         for case in dict.fromkeys(limit.case for limit in limits):
             three = [limit for limit in limits if (limit.method, limit.case) == (method.name, case)]
             table.add_row(

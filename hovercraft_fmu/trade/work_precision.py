@@ -47,6 +47,7 @@ HOLDING_STEPS = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5)
 """s"""
 ORDER_STEPS = (0.1, 0.05, 0.025, 0.0125)
 """s: the range in which the observed orders are fitted; rk4 gets five times as long ones."""
+ORDER_SCENES = ("launch", "cycloid", "turn", "stop")
 REPEATS = 3
 
 Tell = Callable[[float], None]
@@ -259,7 +260,7 @@ class Order(NamedTuple):
 def observed_orders() -> list[Order]:
     """On the smooth scenes (launch, cycloid, and turn, whose pulses start at whole seconds), and through a reversal."""
     orders = []
-    for scene in ("launch", "cycloid", "turn", "stop"):
+    for scene in ORDER_SCENES:
         exact, _ = reference_end(SCENES[scene], STOP_TIME)
         for name, factor in (("semi_implicit_euler", 1.0), ("drag_implicit", 1.0), ("rk4", 5.0)):
             steps = [step * factor for step in ORDER_STEPS]
@@ -269,11 +270,37 @@ def observed_orders() -> list[Order]:
     return orders
 
 
+class Tolerated(NamedTuple):
+    """What the adaptive method makes of a tolerance."""
+
+    scene: str
+    tolerance: float
+    error: float
+    """the largest component at the end, SI units"""
+    substeps: int
+
+
+def tolerance_errors() -> list[Tolerated]:
+    """On the scenes of the observed orders: the error falls with the tolerance."""
+    rows = []
+    for name in ORDER_SCENES:
+        exact, _ = reference_end(SCENES[name], STOP_TIME)
+        for tolerance in TOLERANCES:
+            run = planned(SCENES[name], Setting("adaptive", 0.01, 0.5, tolerance))
+            _, end, count = timed_bare(run, list(schedule(run)))
+            rows.append(Tolerated(name, tolerance, _largest(end, exact), count))
+    return rows
+
+
+def _largest(end: State, exact: State) -> float:
+    return max(abs(a - b) for a, b in zip(end, exact, strict=True))
+
+
 def end_error(scene: Scene, setting: Setting, exact: State) -> float:
     """The largest component error at the end, SI units."""
     run = planned(scene, setting)
     _, end, _ = timed_bare(run, list(schedule(run)))
-    return max(abs(a - b) for a, b in zip(end, exact, strict=True))
+    return _largest(end, exact)
 
 
 def holding_costs() -> list[Holding]:
@@ -296,10 +323,12 @@ def run(folder: Path, quick: bool = False, tell: Tell = lambda _: None) -> Group
     folder.mkdir(parents=True, exist_ok=True)
     rows = measure(quick, tell)
     advice, orders, holding = advise(rows, quick), observed_orders(), holding_costs()
+    tolerances = tolerance_errors()
     _write_csv(folder / "work_precision.csv", [asdict(row) for row in rows])
     _write_csv(folder / "advice.csv", [_advice_record(each) for each in advice])
     _write_csv(folder / "winners.csv", winners(rows))
     _write_csv(folder / "orders.csv", [each._asdict() for each in orders])
+    _write_csv(folder / "tolerances.csv", [each._asdict() for each in tolerances])
     _write_csv(folder / "holding.csv", [each._asdict() for each in holding])
     (folder / "advice.md").write_text(_advice_markdown(advice) + "\n", encoding="utf-8")
     (folder / "machine.txt").write_text(machine() + "\n", encoding="utf-8")
@@ -309,6 +338,7 @@ def run(folder: Path, quick: bool = False, tell: Tell = lambda _: None) -> Group
         f"The cheapest way to an accuracy at the end of {STOP_TIME:g} s, scene {ADVISED_SCENE}", advice_table(advice),
         "\nThe cheapest method (bare) for a position error after 60 s", winner_table(winners(rows)),
         "\nObserved orders: the slope of the error at the end over the step", order_table(orders),
+        "\nThe error of adaptive at the end falls with its tolerance", tolerance_table(tolerances),
         f"\nHolding the inputs of {HELD_SCENE} from one communication point to the next", holding_table(holding),
         f"\n{machine()}", f"\nwrote {folder}/",
     )  # fmt: skip
@@ -381,6 +411,15 @@ def order_table(orders: list[Order]) -> Table:
     table = _table("scene", *names)
     for scene, group in itertools.groupby(orders, key=lambda each: each.scene):
         table.add_row(scene, *(f"{each.slope:.2f}" for each in group))
+    return table
+
+
+def tolerance_table(rows: list[Tolerated]) -> Table:
+    """One row a tolerance, one column a scene."""
+    table = _table("tolerance", *ORDER_SCENES)
+    for tolerance in TOLERANCES:
+        errors = {row.scene: row.error for row in rows if row.tolerance == tolerance}
+        table.add_row(f"{tolerance:g}", *(f"{errors[name]:.1e}" for name in ORDER_SCENES))
     return table
 
 
