@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,8 @@ from .fmu.interface import CRAFT_PARAMETERS, INPUTS
 from .model.craft import Craft, preset
 from .model.dynamics import State
 
-Row: TypeAlias = tuple[float, float, float, float]
-"""time [s], thrust [N], port thruster, starboard thruster [1]."""
+Row: TypeAlias = tuple[float, ...]
+"""time [s], thrust [N], port thruster, starboard thruster [1]; and, where there is wind, its x and y [m/s]."""
 Signals: TypeAlias = NDArray[np.void]
 """Structured array with the fields `time` and names of inputs; linear between rows, a jump is two rows at one time."""
 
@@ -57,13 +57,15 @@ class Scene:
     def craft(self) -> Craft:
         """The craft of the scene."""
         chosen = preset(self.preset)
-        values = {name: getattr(chosen, name) for name in CRAFT_PARAMETERS}
+        values: dict[str, Any] = {name: getattr(chosen, name) for name in CRAFT_PARAMETERS}
         return Craft(**{**values, **self.parameters})
 
 
 def signals(rows: Iterable[Row]) -> Signals:
-    """Rows of (time, thrust, port, starboard) as a structured array."""
-    return np.array(list(rows), dtype=[(name, np.float64) for name in ("time", *INPUTS)])
+    """Rows as a structured array with a column for every input; without wind its columns are 0."""
+    names = ("time", *INPUTS)
+    filled = [(*row, *[0.0] * (len(names) - len(row))) for row in rows]
+    return np.array(filled, dtype=[(name, np.float64) for name in names])
 
 
 def scene(name: str) -> Scene:
@@ -206,6 +208,23 @@ SCENES: Mapping[str, Scene] = MappingProxyType(
                 "a recorded drive on ice: throttle up, a turn to starboard, one to port, one more, throttle off",
                 _control_log("ice.csv"),
                 preset="ice",
+            ),
+            Scene(
+                "crosswind",
+                "straight ahead at 10 N in a wind from port, with a gust from 20 to 30 s",
+                held(
+                    60.0,
+                    (0.0, 10.0, 0.0, 0.0, 0.0, 0.15),
+                    (20.0, 10.0, 0.0, 0.0, 0.0, 0.3),
+                    (30.0, 10.0, 0.0, 0.0, 0.0, 0.15),
+                ),
+            ),
+            Scene(
+                "drift_to_rest",
+                "sliding and spinning to rest on ground that rubs; a push that friction holds, and one it does not",
+                held(60.0, (0.0, 0.0, 0.0, 0.0), (35.0, 3.0, 0.0, 0.0), (45.0, 8.0, 0.0, 0.0)),
+                parameters={"skirt_friction": 0.005},
+                start=State(vx=0.6, vy=-0.8, yaw_rate=0.3),
             ),
         )
     }

@@ -29,18 +29,19 @@ from .fmu.interface import (
     STATES,
     SUBSTEPS_MAX,
     WATCHED,
+    Enumeration,
     observe_action,
     observe_motion,
 )
 from .fmu.package import build_fmu
 from .model.craft import Craft, preset
 from .model.dynamics import Controls, State
-from .model.integrators import integrator, integrator_number
+from .model.integrators import integrator
 from .model.subcycling import Settings, advance, stability_number
 from .scenes import Scene, Signals, scene, signals
 
 Value: TypeAlias = float | int | str
-"""Of a variable; an integrator may be given by its name."""
+"""Of a variable; an item of an enumeration may be given by its name."""
 Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
 """A scene or its name; a CSV file (a name that ends in .csv); a structured array with `time` and input names."""
 Progress: TypeAlias = Callable[[float], None]
@@ -70,7 +71,8 @@ class Run:
     @property
     def craft(self) -> Craft:
         """The craft at the start. Raises ValueError where a parameter is impossible."""
-        return Craft(**{name: float(self.value(name)) for name in CRAFT_PARAMETERS})
+        values: dict[str, Any] = {name: self.value(name) for name in CRAFT_PARAMETERS}
+        return Craft(**values)
 
     @property
     def settings(self) -> Settings:
@@ -262,7 +264,7 @@ def _start_values(given: Mapping[str, Value]) -> dict[str, float | int]:
 
 
 def start_value(name: str, value: Value) -> float | int:
-    """The value as a number of the variable's type; an integrator may be given by name.
+    """The value as a number of the variable's type; an item of an enumeration may be given by name.
 
     Raises:
         ValueError: no such variable, one that cannot be set, or not a number.
@@ -274,13 +276,20 @@ def start_value(name: str, value: Value) -> float | int:
     try:
         if variable.kind == "Real":
             return float(value)
-        if isinstance(value, str) and not value.isdigit():
-            return integrator_number(value)
+        if variable.enumeration and isinstance(value, str) and not value.isdigit():
+            return _item(name, value, variable.enumeration)
         return int(value)
     except (TypeError, ValueError) as error:
-        if name == "integrator":
+        if variable.enumeration and isinstance(value, str):
             raise
         raise ValueError(f"{name} = {value!r}: must be a number") from error
+
+
+def _item(name: str, value: str, enumeration: Enumeration) -> int:
+    number = enumeration.number(value)
+    if number is None:
+        raise ValueError(f"{name} = {value!r}: must be one of {', '.join(item for item, _ in enumeration.items)}")
+    return number
 
 
 def _check_times(run: Run) -> None:
@@ -412,17 +421,18 @@ def run_model(run: Run) -> Result:
     """
     craft, settings, state = run.craft, run.settings, run.start
     controls = _controls(run, run.start_time, after_event=False)
-    count, drag, rotation, proposed = 0, 0.0, 0.0, 0.0
+    count, stability, rotation, proposed = 0, 0.0, 0.0, 0.0
 
     def row(time: float) -> tuple[float, ...]:
         seen = (*observe_motion(state), *observe_action(state, controls, craft))
-        return time, *controls, *state, *seen, stability_number(drag, craft), rotation, count
+        return time, *controls, *state, *seen, stability, rotation, count
 
     rows = [row(run.start_time)]
     for time, end, controls in schedule(run):
         stretch = advance(state, controls, craft, end - time, settings, proposed=proposed)
         state, proposed = stretch.state, stretch.proposed
-        drag, rotation = max(drag, stretch.drag), max(rotation, stretch.rotation)
+        stability = max(stability, stability_number(stretch.drag, stretch.rotation, craft))
+        rotation = max(rotation, stretch.rotation)
         count = min(count + stretch.substeps, SUBSTEPS_MAX)
         rows.append(row(end))
     names = ("time", *INPUTS, *STATES, *MOTION, *ACTION, *WATCHED)

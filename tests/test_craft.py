@@ -37,11 +37,14 @@ def test_derived_values() -> None:
         ("drag_center_fraction", -0.51, "-0.5"),
         ("thrust_min", 10.5, "thrust_max"),
         ("thrust_max", -0.5, "thrust_max"),
+        *((name, -1e-9, "not be negative") for name in ("skirt_friction", "gravity")),
+        *(("rotational_drag", value, "from 0 .off. to 1") for value in (-0.01, 1.01)),
+        *(("drag_area", value, "must be one of 1 .constant., 2 .directional.") for value in (0, 3)),
     ],
 )  # fmt: skip
 def test_impossible_values_are_named(name: str, value: float, rule: str) -> None:
     with pytest.raises(ValueError, match=rule) as caught:
-        Craft(**{name: value})
+        Craft(**{name: value})  # type: ignore[arg-type]
     assert name in str(caught.value)
     assert repr(value) in str(caught.value)
 

@@ -17,6 +17,7 @@ from hovercraft_fmu.model.dynamics import (
     loads,
     saturate,
 )
+from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.model.subcycling import Settings, advance
 from tests.reference import reference_loads, reference_step
 from tests.strategies import calm_crafts, controls, crafts, numbers, states
@@ -106,11 +107,14 @@ def test_power_is_the_rate_of_kinetic_energy(craft: Craft, state: State, asked: 
 def test_drag_alone_never_adds_energy(craft: Craft, state: State, n: int) -> None:
     """A step changes the energy by -h*P + h*h/2*(F*F/m + N*N/I), with P = k*q^3, F <= k*q*q and |N| <= |x_d|*k*q*q.
 
-    So it does not grow while h*k*q*(1/m + x_d^2/I) <= 2, and q is bounded by the energy at the start.
+    So it does not grow while h*k*q*(1/m + x_d^2/I) <= 2, and q is bounded by the energy at the start. The directional
+    area's k is at most the diagonal of its two; the rotational drag adds its own rate.
     """
     energy = kinetic_energy(state, craft)
-    q = math.sqrt(2.0 * energy / craft.mass) + abs(craft.drag_center) * math.sqrt(2.0 * energy / craft.inertia)
-    rate = craft.drag_factor * q * (1.0 / craft.mass + craft.drag_center**2 / craft.inertia)
+    spin = math.sqrt(2.0 * energy / craft.inertia)
+    q = math.sqrt(2.0 * energy / craft.mass) + abs(craft.drag_center) * spin
+    k = max(craft.drag_factor, math.hypot(craft.drag_factor_ahead, craft.drag_factor_abeam))
+    rate = k * q * (1.0 / craft.mass + craft.drag_center**2 / craft.inertia) + craft.spin_rate * spin
     h = 1.0 / rate if rate > 1e-3 else 1.0
     for _ in range(n):
         state = advance(state, Controls(0.0, 0.0, 0.0), craft, h, Settings(h)).state
@@ -124,7 +128,7 @@ def test_a_mirrored_scene_gives_the_mirrored_path_to_the_bit(craft: Craft, state
     def mirrored(s: State) -> State:
         return State(s.x, -s.y, -s.heading, s.vx, -s.vy, -s.yaw_rate)
 
-    swapped = Controls(asked.thrust, asked.starboard, asked.port)
+    swapped = Controls(asked.thrust, asked.starboard, asked.port, asked.wind_x, -asked.wind_y)
     there = advance(state, asked, craft, 0.05).state
     back = advance(mirrored(state), swapped, craft, 0.05).state
     assert mirrored(back) == there
@@ -137,8 +141,9 @@ def test_turning_the_scene_turns_the_path(state: State, asked: Controls, angle: 
         velocity = complex(s.vx, s.vy) * complex(math.cos(angle), math.sin(angle))
         return State(position.real, position.imag, s.heading + angle, velocity.real, velocity.imag, s.yaw_rate)
 
+    wind = complex(asked.wind_x, asked.wind_y) * complex(math.cos(angle), math.sin(angle))
     there = advance(state, asked, Craft(), 0.05).state
-    other = advance(turned(state), asked, Craft(), 0.05).state
+    other = advance(turned(state), asked._replace(wind_x=wind.real, wind_y=wind.imag), Craft(), 0.05).state
     assert other == pytest.approx(turned(there), rel=0.0, abs=1e-11)  # positions to 1e3 m: 1e-13 a rounding
 
 
@@ -150,18 +155,22 @@ def test_without_drag_a_spinning_craft_goes_straight() -> None:
     assert (end.x, end.y) == pytest.approx((30.0, -40.0), rel=1e-11)
 
 
-@given(st.lists(st.tuples(calm_crafts, states, controls), min_size=1, max_size=8))
-def test_a_batch_is_each_craft_alone(batch: list[tuple[Craft, State, Controls]]) -> None:
+@pytest.mark.parametrize("method", [each for each in INTEGRATORS if each.integrate], ids=lambda each: each.name)
+@given(batch=st.lists(st.tuples(calm_crafts, states, controls), min_size=1, max_size=8))
+def test_a_batch_is_each_craft_alone(method: Any, batch: list[tuple[Craft, State, Controls]]) -> None:
     fields = Craft.__dataclass_fields__
     columns: dict[str, Any] = {name: np.array([getattr(craft, name) for craft, _, _ in batch]) for name in fields}
     many = Craft(**columns)
     together = State(*np.array([state for _, state, _ in batch]).T)
     asked = Controls(*np.array([controls for _, _, controls in batch]).T)
     before = np.array(together)
-    end, n, *_ = advance(together, asked, many, 0.01, Settings(0.001), np)
+    way = Settings(0.001, method)
+    end, n, drag, rotation, _ = advance(together, asked, many, 0.01, way, np)
     assert n == 10
     assert np.array_equal(before, np.array(together))  # the caller's arrays are untouched
     for i, (craft, state, alone) in enumerate(batch):
         # numpy's sine may differ from math's in the last bit
-        expected = advance(state, alone, craft, 0.01).state
-        assert [float(np.asarray(part)[i]) for part in end] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+        expected = advance(state, alone, craft, 0.01, way)
+        assert [float(np.asarray(part)[i]) for part in end] == pytest.approx(expected.state, rel=1e-12, abs=1e-12)
+        watched = [float(np.asarray(part)[i]) for part in (drag, rotation)]
+        assert watched == pytest.approx([expected.drag, expected.rotation], rel=1e-12, abs=1e-12)

@@ -91,20 +91,24 @@ def test_drag_implicit_never_adds_energy(craft: Craft, state: State, h: float) -
 
 @given(crafts, states, controls, numbers(1e-4, 1e-3))
 def test_drag_implicit_solves_its_equations(craft: Craft, state: State, asked: Controls, h: float) -> None:
-    """Against numpy's solver on the full 3 x 3 system, in the world frame."""
+    """Against numpy's solver on the full 3 x 3 system, in the world frame; wind stands on its right side."""
     from hovercraft_fmu.model.dynamics import actuation, drag_per_speed
 
-    kq = drag_per_speed(state, craft)
+    kq = drag_per_speed(state, asked, craft)
     ahead = np.array([math.cos(state.heading), math.sin(state.heading)])
     starboard = np.array([-ahead[1], ahead[0]])
     thrust, side, turn = actuation(asked, craft)
     # velocity of the drag point = J (vx, vy, yaw rate)
     point = np.column_stack([np.eye(2), craft.drag_center * starboard])
     inertia = np.diag([craft.mass, craft.mass, craft.inertia])
+    spin = np.diag([0.0, 0.0, craft.spin_drag_factor * abs(state.yaw_rate)])
     push = np.append(thrust * ahead + side * starboard, turn)
-    expected = np.linalg.solve(inertia + h * kq * point.T @ point, inertia @ np.array(state[3:]) + h * push)
+    drag = kq * point.T @ point
+    wind = np.array([asked.wind_x, asked.wind_y, 0.0])
+    right = inertia @ np.array(state[3:]) + h * push + h * drag @ wind
+    expected = np.linalg.solve(inertia + h * drag + h * spin, right)
     end = advance(state, asked, craft, h, Settings(h, method("drag_implicit"))).state
-    scale = np.abs(state[3:]).max() + h * np.abs(push).max() / min(craft.mass, craft.inertia)
+    scale = np.abs([*state[3:], *wind]).max() + h * np.abs(push).max() / min(craft.mass, craft.inertia)
     assert end[3:] == pytest.approx(expected, rel=0.0, abs=1e-9 * scale)  # the condition of the system is up to 1e6
 
 
@@ -157,7 +161,9 @@ def test_what_is_watched(each: Any) -> None:
     craft = Craft(drag_center_fraction=0.0)
     stretch = advance(State(vx=1.0), NONE, craft, 0.5, Settings(0.05, each))
     step = 0.05 if each.integrate else stretch.drag / craft.drag_factor  # of the adaptive method: some step's
-    assert stability_number(stretch.drag, craft) == pytest.approx(step * 2.0 * craft.drag_factor / craft.mass)
+    assert stability_number(stretch.drag, stretch.rotation, craft) == pytest.approx(
+        step * 2.0 * craft.drag_factor / craft.mass
+    )
     spin = advance(State(yaw_rate=-3.0), NONE, Craft(drag_coefficient=0.0), 0.5, Settings(0.05, each))
     assert spin.rotation == pytest.approx(0.15) if each.integrate else spin.rotation <= 1.5
 

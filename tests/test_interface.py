@@ -53,6 +53,12 @@ TABLE = {
     "tolerance": ("parameter", "fixed", "exact", "1", "1e-06"),
     "stability_number": ("local", "continuous", "calculated", "1", None),
     "rotation_per_substep": ("local", "continuous", "calculated", "rad", None),
+    "wind.x": ("input", "continuous", None, "m/s", "0.0"),
+    "wind.y": ("input", "continuous", None, "m/s", "0.0"),
+    "drag_area": ("parameter", "fixed", "exact", None, "1"),
+    "skirt_friction": ("parameter", "tunable", "exact", "1", "0.0"),
+    "gravity": ("parameter", "fixed", "exact", "m/s2", "9.80665"),
+    "rotational_drag": ("parameter", "tunable", "exact", "1", "0.0"),
 }
 DERIVATIVES = {
     "velocity.x": "pose.x",
@@ -112,12 +118,18 @@ def test_units(description: Any, xml: Any) -> None:
     assert all(node.get("declaredType") for node in xml.xpath("//ScalarVariable/Real"))
 
 
-def test_integrator_is_an_enumeration_with_described_items(xml: Any) -> None:
-    assert xml.xpath("//ScalarVariable[@name='integrator']/Enumeration/@declaredType") == ["Integrator"]
-    items = xml.xpath("//SimpleType[@name='Integrator']/Enumeration/Item")
-    assert [(item.get("name"), item.get("value")) for item in items] == [
-        (method.name, str(number)) for number, method in enumerate(INTEGRATORS, 1)
-    ]
+@pytest.mark.parametrize(
+    ("variable", "type_name", "names"),
+    [
+        ("integrator", "Integrator", [method.name for method in INTEGRATORS]),
+        ("drag_area", "DragArea", ["constant", "directional"]),
+    ],
+)
+def test_enumerations_have_described_items(variable: str, type_name: str, names: list[str], xml: Any) -> None:
+    assert xml.xpath(f"//ScalarVariable[@name='{variable}']/Enumeration/@declaredType") == [type_name]
+    items = xml.xpath(f"//SimpleType[@name='{type_name}']/Enumeration/Item")
+    found = [(item.get("name"), item.get("value")) for item in items]
+    assert found == [(name, str(number)) for number, name in enumerate(names, 1)]
     assert all(item.get("description") for item in items)
 
 
@@ -153,4 +165,4 @@ def test_the_head_of_the_description(description: Any, xml: Any) -> None:
 
 def test_the_groups_of_the_table_cover_it() -> None:
     names = [v.name for v in VARIABLES if v.variability == "continuous"]
-    assert names == [*INPUTS, *STATES, *MOTION, *ACTION, *WATCHED]
+    assert names == [*INPUTS[:3], *STATES, *MOTION, *ACTION, *WATCHED, *INPUTS[3:]]

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hovercraft_fmu.cli import commands
-from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, STATES, STEP_TURNS, STEP_UNSTABLE
+from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES, STEP_TURNS, STEP_UNSTABLE
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator_number
@@ -43,6 +43,7 @@ from hovercraft_fmu.trade.stability import (
     measure_extremes,
     sample,
     shares,
+    single,
     theory,
 )
 from tests.lowlevel import another, count, get, one, reference
@@ -188,16 +189,14 @@ def on_the_fmu(instances: list[Any], method: Any, runs: Runs, i: int) -> tuple[i
     """The warnings, the end (None: a step was refused) and what was watched, of run i."""
     instance = instances[-1]
     instance.reset()
-    craft = chosen(runs, [i])
-    values = {name: float(getattr(craft.craft, name)[0]) for name in CRAFT_PARAMETERS}
-    starts = zip(STATES, craft.start, strict=True)
-    values |= {name: float(np.asarray(value)[0]) for name, value in starts}
-    inputs = zip(("thrust", "port_thruster", "starboard_thruster"), craft.controls, strict=True)
-    values |= {name: float(np.asarray(value)[0]) for name, value in inputs}
+    craft, controls, begin = single(runs, i)
+    values: dict[str, Any] = {name: getattr(craft, name) for name in CRAFT_PARAMETERS}
+    area = values.pop("drag_area")
+    values |= dict(zip((*STATES, *INPUTS), (*begin, *controls), strict=True))
     h = values["step_size"] = float(runs.h[i])
     instance.setupExperiment()
     instance.setReal([reference(name) for name in values], list(values.values()))
-    instance.setInteger([reference("integrator")], [integrator_number(method.name)])
+    instance.setInteger([reference("integrator"), reference("drag_area")], [integrator_number(method.name), area])
     instance.enterInitializationMode()
     instance.exitInitializationMode()
     try:
@@ -307,7 +306,7 @@ def test_a_day_of_slalom(method: Any) -> None:
         speed = math.hypot(state.vx, state.vy)
         fastest, total = max(fastest, speed), total + speed
     assert all(map(math.isfinite, state))
-    assert stability_number(drag, craft) < method.stability_limit
+    assert stability_number(drag, rotation, craft) < method.stability_limit
     assert rotation < method.rotation_limit
     # 10 N ahead and 3 N abeam at most; the drag point may be slower than the craft that swings about it, by little
     assert fastest < 1.1 * math.sqrt(13.0 / craft.drag_factor)

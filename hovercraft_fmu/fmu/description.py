@@ -3,8 +3,7 @@
 from xml.etree.ElementTree import Element, SubElement
 
 from .._version import RELEASE_DATE, __version__
-from ..model.integrators import INTEGRATORS
-from .interface import INDEX, UNITS, VARIABLES, Variable
+from .interface import ENUMERATIONS, INDEX, UNITS, VARIABLES, Variable
 
 MODEL_NAME = "Hovercraft"
 DESCRIPTION = (
@@ -92,10 +91,11 @@ def _types(parent: Element) -> None:
         real = SubElement(node, "Real", {"quantity": unit.quantity, "unit": name})
         if unit.display:
             real.set("displayUnit", unit.display[0])
-    node = SubElement(parent, "SimpleType", {"name": "Integrator", "description": "Numerical method of a sub-step"})
-    enumeration = SubElement(node, "Enumeration", {"quantity": "Integrator"})
-    for number, method in enumerate(INTEGRATORS, 1):
-        SubElement(enumeration, "Item", {"name": method.name, "value": str(number), "description": method.description})
+    for each in ENUMERATIONS:
+        node = SubElement(parent, "SimpleType", {"name": each.type_name, "description": each.description})
+        items = SubElement(node, "Enumeration", {"quantity": each.type_name})
+        for number, (name, text) in enumerate(each.items, 1):
+            SubElement(items, "Item", {"name": name, "value": str(number), "description": text})
 
 
 def _variable(parent: Element, variable: Variable) -> None:
@@ -113,8 +113,8 @@ def _variable(parent: Element, variable: Variable) -> None:
 
 def _typed(parent: Element, variable: Variable) -> None:
     node = SubElement(parent, variable.kind)
-    if variable.kind == "Enumeration":
-        node.set("declaredType", "Integrator")
+    if variable.enumeration:
+        node.set("declaredType", variable.enumeration.type_name)
     if variable.unit:
         unit = UNITS[variable.unit]
         node.set("declaredType", unit.type_name)

@@ -6,7 +6,7 @@ from math import sqrt
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
-from ..model.craft import Craft
+from ..model.craft import DRAG_AREAS, Craft
 from ..model.dynamics import Controls, State, actuation, body_velocity, loads
 from ..model.integrators import INTEGRATORS
 
@@ -64,6 +64,30 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
 
 
 @dataclass(frozen=True)
+class Enumeration:
+    """An enumeration as FMI wants it; the items are numbered from 1."""
+
+    type_name: str
+    description: str
+    items: tuple[tuple[str, str], ...]
+    """Name, description."""
+
+    def number(self, name: str) -> int | None:
+        """The number of an item; None: there is none of that name."""
+        names = [item for item, _ in self.items]
+        return names.index(name) + 1 if name in names else None
+
+
+INTEGRATOR = Enumeration(
+    "Integrator",
+    "Numerical method of a sub-step",
+    tuple((method.name, method.description) for method in INTEGRATORS),
+)
+DRAG_AREA = Enumeration("DragArea", "The area that the drag coefficient refers to", DRAG_AREAS)
+ENUMERATIONS = (INTEGRATOR, DRAG_AREA)
+
+
+@dataclass(frozen=True)
 class Variable:
     """A row of the table. Names and value references stay as they are within a major version."""
 
@@ -81,6 +105,8 @@ class Variable:
     derivative_of: str | None = None
     depends_on: tuple[str, ...] = ()
     """For a calculated output or parameter: the start values that its own start follows from."""
+    enumeration: "Enumeration | None" = None
+    """The choices of a variable of this kind."""
 
     @property
     def initial(self) -> str | None:
@@ -159,7 +185,7 @@ VARIABLES: tuple[Variable, ...] = (
              "Centre of drag ahead of the centre of gravity, as a fraction of the length; negative: behind it",
              minimum=-0.5, maximum=0.5),
     Variable(29, "projected_area", "calculatedParameter", "fixed", "m2", None,
-             "Area that the drag coefficient refers to: (length + width) / 2 * height",
+             "Area that the drag coefficient refers to where drag_area is constant: (length + width) / 2 * height",
              depends_on=("length", "width", "height")),
     Variable(30, "steering_force", "parameter", "tunable", "N", _CRAFT.steering_force,
              "Side force of one bow thruster, full on", minimum=0.0),
@@ -172,7 +198,7 @@ VARIABLES: tuple[Variable, ...] = (
              minimum=0.0, nominal=0.001),
     Variable(34, "integrator", "parameter", "fixed", None, 1,
              "The method that carries the state over a sub-step", kind="Enumeration",
-             minimum=1, maximum=len(INTEGRATORS)),
+             minimum=1, maximum=len(INTEGRATOR.items), enumeration=INTEGRATOR),
     # -- added later: value references only grow
     Variable(35, "warnings", "local", "discrete", None, None,
              "Sum of the warnings since initialization: " + "; ".join(f"{b}: {t}" for b, t in WARNINGS.items()),
@@ -182,16 +208,31 @@ VARIABLES: tuple[Variable, ...] = (
              "tolerance that the host gives with the experiment wins", minimum=0.0, nominal=1e-6),
     Variable(37, "stability_number", "local", "continuous", "1", None,
              "Largest so far, over every sub-step, of sub-step * 2*k*q*(1/mass + x_d^2/inertia), the fastest "
-             "linearized drag rate; the classical limits are 2 for Euler, 2.785 for RK4", minimum=0.0),
+             "linearized drag rate (rotational drag adds its own); the classical limits are 2 for Euler, 2.785 for RK4",
+             minimum=0.0),
     Variable(38, "rotation_per_substep", "local", "continuous", "rad", None,
              "Largest turn in a sub-step so far, over every sub-step: |yaw rate| * sub-step", minimum=0.0),
+    # -- what a scene may ask for: each off by default
+    Variable(39, "wind.x", "input", "continuous", "m/s", 0.0,
+             "Velocity of the air over ground, world frame; drag acts on the velocity through the air", nominal=0.1),
+    Variable(40, "wind.y", "input", "continuous", "m/s", 0.0,
+             "Velocity of the air over ground, world frame, down the screen", nominal=0.1),
+    Variable(41, "drag_area", "parameter", "fixed", None, _CRAFT.drag_area, DRAG_AREA.description,
+             kind="Enumeration", minimum=1, maximum=len(DRAG_AREA.items), enumeration=DRAG_AREA),
+    Variable(42, "skirt_friction", "parameter", "tunable", "1", _CRAFT.skirt_friction,
+             "Coulomb's coefficient of the friction between skirt and ground; 0 is off", minimum=0.0),
+    Variable(43, "gravity", "parameter", "fixed", "m/s2", _CRAFT.gravity,
+             "Acceleration of free fall, for the friction", minimum=0.0),
+    Variable(44, "rotational_drag", "parameter", "tunable", "1", _CRAFT.rotational_drag,
+             "Share of the moment of the air on the rotating box about its own centre; 0 is off",
+             minimum=0.0, maximum=1.0),
 )  # fmt: skip
 
 BY_NAME: Mapping[str, Variable] = MappingProxyType({variable.name: variable for variable in VARIABLES})
 INDEX: Mapping[str, int] = MappingProxyType({variable.name: i for i, variable in enumerate(VARIABLES, 1)})
 """Place in ModelVariables, counted from 1: what the model structure refers to."""
 
-INPUTS = ("thrust", "port_thruster", "starboard_thruster")
+INPUTS = ("thrust", "port_thruster", "starboard_thruster", "wind.x", "wind.y")
 """In the order of Controls."""
 STATES = ("pose.x", "pose.y", "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
 """In the order of State."""

@@ -48,11 +48,12 @@ SAME_TIME = 1e-9
 BY_REFERENCE = {variable.reference: variable for variable in VARIABLES}
 REALS = frozenset(v.reference for v in VARIABLES if v.kind == "Real")
 INTEGERS = frozenset(v.reference for v in VARIABLES if v.kind != "Real")
-THRUST, PORT, STARBOARD = (BY_NAME[name].reference for name in INPUTS)
+THRUST, PORT, STARBOARD, WIND_X, WIND_Y = (BY_NAME[name].reference for name in INPUTS)
 STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
 MOTION_REFERENCES = STATE_REFERENCES + tuple(BY_NAME[name].reference for name in MOTION)
 ACTION_REFERENCES = tuple(BY_NAME[name].reference for name in ACTION + WATCHED)
-INPUT_REFERENCES = frozenset((THRUST, PORT, STARBOARD))
+INPUT_REFERENCES = frozenset((THRUST, PORT, STARBOARD, WIND_X, WIND_Y))
+CRAFT_REFERENCES = tuple(BY_NAME[name].reference for name in CRAFT_PARAMETERS)
 ACTION_SET = frozenset(ACTION_REFERENCES)
 STEP_SIZE = BY_NAME["step_size"].reference
 INTEGRATOR = BY_NAME["integrator"].reference
@@ -106,8 +107,7 @@ class HovercraftSlave(WrappedSlave):
         self._settings = Settings()
         self._hosts_tolerance: float | None = None  # with the experiment; it comes before the parameter
         self._proposed = 0.0  # the next step of the adaptive method
-        self._drag = self._rotation = 0.0  # the largest of a sub-step so far
-        self._drag_limit = 0.0  # where the stability number passes the method's limit
+        self._stability = self._rotation = 0.0  # the largest of a sub-step so far
         self._tuned = False  # a parameter was set since then: the next step takes it up
         self._stale = True  # the motion that is read is not yet that of the communication point
         self._acting = False  # what acts on the craft is among the values that are read
@@ -146,7 +146,7 @@ class HovercraftSlave(WrappedSlave):
                     f"currentCommunicationPoint = {current_time!r} s: must be where the last step ended, {time!r} s"
                 )
             reals = self._reals
-            controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD])
+            controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD], reals[WIND_X], reals[WIND_Y])
             craft = self._make_craft() if self._tuned else self._craft
             try:
                 stretch = advance(self._state, controls, craft, step_size, self._settings, proposed=self._proposed)
@@ -159,13 +159,15 @@ class HovercraftSlave(WrappedSlave):
             self._stale = True
             if self._integers[SUBSTEPS] > SUBSTEPS_MAX:
                 self._stop_counter()
-            if drag > self._drag:
-                self._drag = drag
+            stability = stability_number(drag, rotation, craft)
+            if stability > self._stability:
+                self._stability = stability
             if rotation > self._rotation:
                 self._rotation = rotation
-            if drag > self._drag_limit or rotation > self._settings.integrator.rotation_limit:
+            method = self._settings.integrator
+            if stability > method.stability_limit or rotation > method.rotation_limit:
                 self._warn_of_the_step()
-            thrust, port, starboard = controls
+            thrust, port, starboard, _, _ = controls
             if not (craft.thrust_min <= thrust <= craft.thrust_max and 0.0 <= port <= 1.0 and 0.0 <= starboard <= 1.0):
                 self._warn_of_held_inputs()
             return True
@@ -180,7 +182,7 @@ class HovercraftSlave(WrappedSlave):
 
     def _warn_of_the_step(self) -> None:
         method, step = self._settings.integrator, self._settings.step_size
-        number, rotation = stability_number(self._drag, self._craft), self._rotation
+        number, rotation = self._stability, self._rotation
         if number > method.stability_limit:
             self._warn(
                 STEP_UNSTABLE,
@@ -316,19 +318,21 @@ class HovercraftSlave(WrappedSlave):
             self._stale = True
 
     def _make_craft(self) -> Craft:
-        return Craft(**{name: self._reals[BY_NAME[name].reference] for name in CRAFT_PARAMETERS})
+        values: dict[str, Any] = {
+            name: self._reals[reference] if reference in REALS else self._integers[reference]
+            for name, reference in zip(CRAFT_PARAMETERS, CRAFT_REFERENCES, strict=True)
+        }
+        return Craft(**values)
 
     def _take_up_settings(self) -> None:
         tolerance = self._reals[TOLERANCE] if self._hosts_tolerance is None else self._hosts_tolerance
         self._settings = Settings(self._reals[STEP_SIZE], integrator(self._integers[INTEGRATOR]), tolerance)
-        # mass, inertia and drag centre are fixed, so this is, too
-        self._drag_limit = self._settings.integrator.stability_limit / stability_number(1.0, self._craft)
 
     def _take_up_start_values(self) -> None:
         reals = self._reals
         self._craft = self._make_craft()
         self._take_up_settings()
-        self._controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD])
+        self._controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD], reals[WIND_X], reals[WIND_Y])
         self._state = State(*(reals[BY_NAME[name].reference] for name in STATES))
         reals[PROJECTED_AREA] = self._craft.projected_area
         self._tuned = False
@@ -354,8 +358,7 @@ class HovercraftSlave(WrappedSlave):
         if not self._acting:
             action = observe_action(self._state, self._controls, self._craft)
             _refuse_non_finite(ACTION, action)
-            watched = (stability_number(self._drag, self._craft), self._rotation)
-            self._reals.update(zip(ACTION_REFERENCES, action + watched, strict=True))
+            self._reals.update(zip(ACTION_REFERENCES, (*action, self._stability, self._rotation), strict=True))
             self._acting = True
 
     # ---- FMU state
@@ -373,7 +376,7 @@ class HovercraftSlave(WrappedSlave):
             "craft": [getattr(self._craft, name) for name in CRAFT_PARAMETERS],
             "tuned": self._tuned,
             "tolerance": self._hosts_tolerance,
-            "drag": self._drag,
+            "stability": self._stability,
             "rotation": self._rotation,
             "proposed": self._proposed,
         }
@@ -392,7 +395,7 @@ class HovercraftSlave(WrappedSlave):
         self._reals[PROJECTED_AREA] = self._craft.projected_area
         self._hosts_tolerance = state["tolerance"]
         self._take_up_settings()
-        self._drag, self._rotation, self._proposed = state["drag"], state["rotation"], state["proposed"]
+        self._stability, self._rotation, self._proposed = state["stability"], state["rotation"], state["proposed"]
         self._tuned = state["tuned"]
         self._stale = True
 

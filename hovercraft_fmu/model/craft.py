@@ -2,13 +2,22 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import cast
 
 POSITIVE = ("mass", "inertia", "length", "width", "height")
-NOT_NEGATIVE = ("drag_coefficient", "air_density", "steering_force")
+NOT_NEGATIVE = ("drag_coefficient", "air_density", "steering_force", "skirt_friction", "gravity")
+CONSTANT, DIRECTIONAL = 1, 2
+DRAG_AREAS = (
+    (
+        "constant",
+        "The mean of the areas seen bow-on and abeam, (length + width)/2 * height, for air from anywhere",
+    ),
+    ("directional", "The area of the box length x width x height as the air at the drag point sees it"),
+)
+"""The choices of drag_area, from 1: name, description."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +52,14 @@ class Craft:
     """N; a negative value allows reverse thrust."""
     thrust_max: float = 10.0
     """N."""
+    drag_area: int = CONSTANT
+    """1 constant, 2 directional: the area that the drag coefficient refers to."""
+    skirt_friction: float = 0.0
+    """1, Coulomb's coefficient between skirt and ground; 0 is off."""
+    gravity: float = 9.80665
+    """m/s2, for the friction. Standard acceleration of free fall (3rd CGPM, 1901)."""
+    rotational_drag: float = 0.0
+    """1, the share (0 to 1) of the moment of the air on the rotating box about its own centre; 0 is off."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -66,6 +83,54 @@ class Craft:
         return 0.5 * self.air_density * self.projected_area * self.drag_coefficient
 
     @cached_property
+    def drag_factor_ahead(self) -> float:
+        """kg/m: the same for the bow's area, W*H."""
+        return 0.5 * self.air_density * (self.width * self.height) * self.drag_coefficient
+
+    @cached_property
+    def drag_factor_abeam(self) -> float:
+        """kg/m: the same for the side's area, L*H."""
+        return 0.5 * self.air_density * (self.length * self.height) * self.drag_coefficient
+
+    @cached_property
+    def spin_drag_factor(self) -> float:
+        """kg.m2: of the moment -factor*r*|r| of the air on the rotating box about its own centre.
+
+        A strip of the side at the distance s from the centre moves through the air at r*s and feels the cross-flow
+        drag 0.5*rho*Cd*H*(r*s)*|r*s| a metre; times its lever arm s, integrated over the length (the cross-flow
+        principle: Faltinsen, Sea Loads on Ships and Offshore Structures, 1990, chapter 6; Fossen, Handbook of Marine
+        Craft Hydrodynamics and Motion Control, 2011, section 6.4): rho*Cd*H*L^4/64 * r*|r|.
+        """
+        square = self.length * self.length
+        whole = self.air_density * self.drag_coefficient * self.height * (square * square) / 64
+        return self.rotational_drag * whole
+
+    @cached_property
+    def friction_force(self) -> float:
+        """N: the most that skirt and ground hold against a push, mu*m*g."""
+        return self.skirt_friction * self.mass * self.gravity
+
+    @cached_property
+    def plain_drag(self) -> bool:
+        """Whether drag is the default's: of constant area, and with no moment of its own."""
+        return not (any_of(self.drag_area - CONSTANT) or any_of(self.rotational_drag))
+
+    @cached_property
+    def rubs(self) -> bool:
+        """Whether skirt and ground rub."""
+        return any_of(self.skirt_friction)
+
+    @cached_property
+    def drag_rate(self) -> float:
+        """1/kg: what a drag of k*q [kg/s] at the drag point damps with, at most, 2*(1/m + x_d^2/I) of it."""
+        return 2.0 * (1.0 / self.mass + self.drag_center * self.drag_center / self.inertia)
+
+    @cached_property
+    def spin_rate(self) -> float:
+        """1: what the rotational drag at a yaw rate r damps with, this times |r|."""
+        return 2.0 * self.spin_drag_factor / self.inertia
+
+    @cached_property
     def drag_center(self) -> float:
         """m: x of the centre of drag in the body frame; negative is behind the centre of gravity."""
         return self.drag_center_fraction * self.length
@@ -81,6 +146,12 @@ def _items(value: float) -> Iterable[float]:
     return cast(Iterable[float], getattr(value, "flat", (value,)))
 
 
+def any_of(value: float) -> bool:
+    """Whether the number, or any of an array of numbers, is not zero."""
+    of_array = getattr(value, "any", None)
+    return bool(of_array() if of_array else value)
+
+
 def check_parameter(name: str, value: float) -> None:
     """Raises ValueError, with the name, the value and the rule, where one parameter alone is impossible."""
     rule = None
@@ -92,8 +163,13 @@ def check_parameter(name: str, value: float) -> None:
         rule = "must not be negative"
     elif name == "drag_center_fraction" and not -0.5 <= value <= 0.5:
         rule = "must be from -0.5 (stern) to 0.5 (bow)"
+    elif name == "rotational_drag" and not 0.0 <= value <= 1.0:
+        rule = "must be from 0 (off) to 1 (the whole moment)"
+    elif name == "drag_area" and value not in (CONSTANT, DIRECTIONAL):
+        rule = "must be one of " + ", ".join(f"{i} ({name})" for i, (name, _) in enumerate(DRAG_AREAS, 1))
     if rule:
-        raise ValueError(f"{name} = {float(value)!r}: {rule}")
+        shown = value if isinstance(value, int) else float(value)  # not numpy's kind of number
+        raise ValueError(f"{name} = {shown!r}: {rule}")
 
 
 PRESETS: Mapping[str, Craft] = MappingProxyType(
@@ -110,8 +186,3 @@ def preset(name: str) -> Craft:
     if name not in PRESETS:
         raise ValueError(f"preset = {name!r}: must be one of {', '.join(PRESETS)}")
     return PRESETS[name]
-
-
-def with_parameters(craft: Craft, parameters: Mapping[str, float]) -> Craft:
-    """The craft with some parameters changed. Raises ValueError as Craft does."""
-    return replace(craft, **parameters)

@@ -4,8 +4,21 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
-from .craft import Craft
-from .dynamics import Controls, Namespace, State, actuation, load_function
+from .craft import Craft, any_of
+from .dynamics import (
+    Controls,
+    LoadFunction,
+    Namespace,
+    State,
+    actuation,
+    friction_function,
+    friction_gains,
+    friction_radius,
+    load_function,
+    sliding_load_function,
+    slip_speed,
+    windy,
+)
 
 MIN_STEP = 1e-12
 """s: below it the adaptive method gives up."""
@@ -33,9 +46,11 @@ def semi_implicit_euler(
 ) -> Stretch:
     """Symplectic Euler: loads from the start of the sub-step, velocity first, then the pose from the new velocity.
 
-    First order. The loop holds plain numbers: an object made at every sub-step would cost more than the physics.
+    First order; friction is an implicit step of its own, between the two. The loop holds plain numbers: an object made
+    at every sub-step would cost more than the physics.
     """
     loads_at = load_function(controls, craft, ns)
+    rubbed = friction_function(craft, h, ns) if craft.rubs else None
     mass, inertia, single = craft.mass, craft.inertia, ns is math
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
@@ -44,9 +59,11 @@ def semi_implicit_euler(
         # `a = a + b`, never `a += b`: that would write into the caller's arrays
         vx = vx + h * (force_x / mass)
         vy = vy + h * (force_y / mass)
+        yaw_rate = yaw_rate + h * (moment / inertia)
+        if rubbed:
+            vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
         x = x + h * vx
         y = y + h * vy
-        yaw_rate = yaw_rate + h * (moment / inertia)
         heading = heading + h * yaw_rate
         if single:
             if kq > most:
@@ -75,12 +92,18 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     v' = (I a + g x_d e)/det, r' = (m b - g e)/det (Cramer's rule; what cancels is taken out by hand, so nothing is
     lost where g is large). The matrix is the mass plus g times a square, so drag alone never adds kinetic energy;
     straight coasting gives v' = v/(1 + h kappa v), which is exact, and T = k*u*u stays where it is.
+
+    In wind the same holds of the velocity through the air, which is what drag takes away. A moment of the rotation
+    itself, -d r |r|, adds h d |r| to I on the left side. Friction is an implicit step of its own, after it.
     """
     loads_at = load_function(controls, craft, ns)
+    rubbed = friction_function(craft, h, ns) if craft.rubs else None
+    in_wind, spins = windy(controls), any_of(craft.rotational_drag)
+    wind_x, wind_y, spin = controls.wind_x, controls.wind_y, craft.spin_drag_factor
     thrust, side, turn = actuation(controls, craft, ns)
     cos, sin, single = ns.cos, ns.sin, ns is math
     mass, inertia, x_d = craft.mass, craft.inertia, craft.drag_center
-    spread = inertia + mass * x_d * x_d
+    damped, arm = inertia, mass * x_d * x_d
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
@@ -88,15 +111,23 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
         c = cos(heading)
         s = sin(heading)
         g = h * kq
+        if in_wind:
+            vx, vy = vx - wind_x, vy - wind_y
+        if spins:
+            damped = inertia + h * spin * abs(yaw_rate)
         surge = (mass * (c * vx + s * vy) + h * thrust) / (mass + g)
         a = mass * (c * vy - s * vx) + h * side
         b = inertia * yaw_rate + h * turn
         e = x_d * a - b
-        determinant = mass * inertia + g * spread
-        sway = (inertia * a + g * x_d * e) / determinant
+        determinant = mass * damped + g * (damped + arm)
+        sway = (damped * a + g * x_d * e) / determinant
         yaw_rate = (mass * b - g * e) / determinant
         vx = c * surge - s * sway
         vy = s * surge + c * sway
+        if in_wind:
+            vx, vy = vx + wind_x, vy + wind_y
+        if rubbed:
+            vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
         x = x + h * vx
         y = y + h * vy
         heading = heading + h * yaw_rate
@@ -115,12 +146,51 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
 
 
 def rk4(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math) -> Stretch:
-    """The classic Runge-Kutta method (Kutta 1901), fourth order.
+    """The classic Runge-Kutta method (Kutta 1901), fourth order; where friction could stop the craft, Euler's."""
+    if craft.rubs:
+        return _rk4_with_friction(state, controls, craft, h, n, ns)
+    return _rk4(load_function(controls, craft, ns), state, craft, h, n, ns)
 
-    The derivative of the pose is the velocity, so the pose needs no stages of its own:
+
+NEAR_REST = 4.0
+"""Sub-steps in which friction could stop the craft: nearer to rest, its force turns too far in a sub-step."""
+
+
+def _rk4_with_friction(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace) -> Stretch:
+    """While it slides, friction is a load like others, and smooth. Near rest it is not: an implicit step of Euler's."""
+    sliding = sliding_load_function(controls, craft, ns)
+    radius = friction_radius(craft, ns)
+    larger = max if ns is math else ns.fmax
+    near = NEAR_REST * larger(*friction_gains(craft, h, ns))
+    drag = rotation = 0.0
+    for _ in range(n):
+        at_rest = slip_speed(state.vx, state.vy, radius * state.yaw_rate, ns) <= near
+        if ns is not math:
+            stretch = _either(
+                at_rest,
+                semi_implicit_euler(state, controls, craft, h, 1, ns),
+                _rk4(sliding, state, craft, h, 1, ns),
+                ns,
+            )
+        elif at_rest:
+            stretch = semi_implicit_euler(state, controls, craft, h, 1)
+        else:
+            stretch = _rk4(sliding, state, craft, h, 1, ns)
+        state, drag, rotation = stretch.state, larger(drag, stretch.drag), larger(rotation, stretch.rotation)
+    return Stretch(state, n, drag, rotation)
+
+
+def _either(condition: bool, this: Stretch, other: Stretch, ns: Namespace) -> Stretch:
+    """For arrays of craft: of each the one stretch or the other."""
+    state = State(*(ns.where(condition, a, b) for a, b in zip(this.state, other.state, strict=True)))
+    drag, rotation = ns.where(condition, this.drag, other.drag), ns.where(condition, this.rotation, other.rotation)
+    return Stretch(state, this.substeps, drag, rotation)
+
+
+def _rk4(loads_at: LoadFunction, state: State, craft: Craft, h: float, n: int, ns: Namespace) -> Stretch:
+    """The derivative of the pose is the velocity, so the pose needs no stages of its own:
     h/6 (v1 + 2 v2 + 2 v3 + v4) = h v + h^2/6 (a1 + a2 + a3).
     """
-    loads_at = load_function(controls, craft, ns)
     mass, inertia, single = craft.mass, craft.inertia, ns is math
     half, sixth, square = 0.5 * h, h / 6.0, h * h / 6.0
     x, y, heading, vx, vy, yaw_rate = state
@@ -191,18 +261,27 @@ def adaptive(
     a fixed scale, which does not depend on where the craft is. The next step is 0.9*(tolerance/error)^(1/4) times as
     long (at least 1/5, at most 5 times): two square roots, which every platform rounds alike, instead of a fifth root.
 
+    With friction a step is no longer than a quarter of the time in which the craft would come to rest, so that the
+    error estimate never looks across that point, nor than the time in which friction takes on the direction of the
+    motion; slower than the tolerance, an implicit step of Euler's is taken.
+
     Raises:
         StepTooSmallError: no step down to 1e-12 s meets the tolerance.
     """
     rates_at = _rate_function(controls, craft)
+    reach = _reach_function(craft, tolerance)
     y = tuple(state)
     first, kq = rates_at(y)
     time, count, most, fastest = 0.0, 0, 0.0, 0.0
     while time < duration:
-        last = proposed >= duration - time
-        h = duration - time if last else proposed
+        h = min(duration - time, proposed)
+        slides, longest = reach(y, first)
+        h = min(h, longest) if slides else h
+        last = h >= duration - time
         try:
-            new, rates, error = _dormand_prince(y, first, h, rates_at)
+            new, rates, error = (
+                _dormand_prince(y, first, h, rates_at) if slides else _near_rest(y, controls, craft, h, rates_at)
+            )
         except (ValueError, OverflowError):  # what math.sin says of an infinite angle
             error = math.inf
         if not error <= tolerance:
@@ -225,8 +304,41 @@ Rates: TypeAlias = tuple[Vector, float]
 """The derivative of the state, and k*q there."""
 
 
+def _reach_function(craft: Craft, tolerance: float) -> Callable[[Vector, Vector], tuple[bool, float]]:
+    """(state, its rates) -> whether the craft slides, and the longest step [s]; without friction, any.
+
+    It does not slide where it is slower than the tolerance (or a step would be too small): there the error of stopping
+    it, or of letting it go, is below the tolerance, too.
+    """
+    if not craft.rubs:
+        return lambda _y, _rates: (True, math.inf)
+    radius, fastest = friction_radius(craft), max(friction_gains(craft, 1.0))
+
+    def reach(y: Vector, rates: Vector) -> tuple[bool, float]:
+        turning = radius * y[5]
+        speed = slip_speed(y[3], y[4], turning)
+        if not speed > tolerance:
+            return False, math.inf
+        gain = (y[3] * rates[3] + y[4] * rates[4] + radius * turning * rates[5]) / speed
+        # its direction goes back to that of the motion at the rate `fastest / speed`: longer steps were not stable
+        longest = speed / max(fastest, NEAR_REST * -gain)
+        return longest > MIN_STEP, longest
+
+    return reach
+
+
+def _near_rest(
+    y: Vector, controls: Controls, craft: Craft, h: float, rates_at: Callable[[Vector], Rates]
+) -> tuple[Vector, Rates, float]:
+    """An implicit step of Euler's; its error is at most all that it changes of the velocity, and h times that."""
+    new = semi_implicit_euler(State(*y), controls, craft, h, 1).state
+    change = max(abs(after - before) for after, before in zip(new[3:], y[3:], strict=True))
+    error = change * max(1.0, h)
+    return tuple(new), rates_at(tuple(new)), error if math.isfinite(error) else math.inf
+
+
 def _rate_function(controls: Controls, craft: Craft) -> Callable[[Vector], Rates]:
-    loads_at = load_function(controls, craft)
+    loads_at = sliding_load_function(controls, craft) if craft.rubs else load_function(controls, craft)
     mass, inertia = craft.mass, craft.inertia
 
     def rates_at(y: Vector) -> Rates:

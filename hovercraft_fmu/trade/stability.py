@@ -298,7 +298,8 @@ def adaptive_qualities(case: Case, i: int, x: float) -> tuple[bool, bool, bool]:
 def single(runs: Runs, i: int) -> tuple[Craft, Controls, State]:
     """One of the runs, in plain floats."""
     one = chosen(runs, [i])
-    craft = Craft(**{each.name: float(getattr(one.craft, each.name)[0]) for each in fields(Craft)})
+    values: dict[str, Any] = {each.name: getattr(one.craft, each.name)[0].item() for each in fields(Craft)}
+    craft = Craft(**values)
     controls, start = ([float(np.asarray(value)[0]) for value in values] for values in (one.controls, one.start))
     return craft, Controls(*controls), State(*start)
 
@@ -379,7 +380,7 @@ def own_steps(rng: np.random.Generator, runs: Runs) -> Array:
     craft, k = runs.craft, runs.craft.drag_factor
     force = np.abs(thrust) + np.abs(side) + np.abs(turn / craft.length)
     # drag at the speed of the start and at the terminal speed, rotation now and by the thrusters
-    drag = stability_number(1.0, craft) * (drag_per_speed(runs.start, craft, np) + np.sqrt(k * force))
+    drag = craft.drag_rate * (drag_per_speed(runs.start, runs.controls, craft, np) + np.sqrt(k * force))
     rotation = np.abs(runs.start.yaw_rate) + np.sqrt(np.abs(turn) / craft.inertia)
     return np.minimum(_logarithmic(rng, 1e-5, 3.0, len(runs.h)) / (drag + rotation + 1e-6), 10.0)
 
@@ -451,7 +452,7 @@ def carry_out(runs: Runs, method: Integrator) -> Outcome:
             drag, rho = np.fmax(drag, stretch.drag), np.fmax(rho, stretch.rotation)
             speed = np.fmax(speed, _size(state.vx, state.vy, state.yaw_rate, craft))
             finite &= np.isfinite(np.sum(state, axis=0))
-        sigma = stability_number(drag, craft)
+        sigma = stability_number(drag, rho, craft)
         return Outcome(state, sigma, rho, _swing(runs, drag), _per(_gain(runs), speed), speed, finite)
 
 

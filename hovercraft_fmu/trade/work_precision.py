@@ -21,7 +21,7 @@ from rich.table import Table
 from .._version import __version__
 from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
 from ..fmu.package import build_fmu
-from ..model.dynamics import Controls, State
+from ..model.dynamics import Controls, State, windy
 from ..model.subcycling import advance
 from ..scenes import SCENES, Scene
 from ..simulation import Run, Value, instantiated, plan, read_description, schedule
@@ -155,9 +155,13 @@ def _while_held(steps: Sequence[tuple[float, float, Controls]]) -> Iterator[tupl
 
 
 def timed_fmu(instance: Any, run: Run, steps: Sequence[tuple[float, float, Controls]]) -> float:
-    """Seconds for the whole run through fmpy: three inputs, a step, nine outputs at every communication point."""
-    inputs, outputs = _references(INPUTS), _references(v.name for v in VARIABLES if v.causality == "output")
-    values = [(fmi2.fmi2Real * len(INPUTS))(*controls) for _, _, controls in steps]
+    """Seconds for the whole run through fmpy: three inputs, a step, nine outputs at every communication point.
+
+    In wind, five inputs.
+    """
+    driven = INPUTS if any(windy(controls) for _, _, controls in steps) else INPUTS[:3]
+    inputs, outputs = _references(driven), _references(v.name for v in VARIABLES if v.causality == "output")
+    values = [(fmi2.fmi2Real * len(driven))(*controls[: len(driven)]) for _, _, controls in steps]
     read = (fmi2.fmi2Real * len(outputs))()
     instance.reset()
     instance.setupExperiment(startTime=run.start_time)
