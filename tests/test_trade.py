@@ -55,6 +55,7 @@ def test_observed_orders() -> None:
         assert orders[scene, "drag_implicit"] == pytest.approx(1.0, abs=0.1)
         assert orders[scene, "rk4"] == pytest.approx(4.0, abs=0.1)
     assert orders["stop", "rk4"] < 3.0  # the kink at rest
+    assert orders["drift_to_rest", "rk4"] == pytest.approx(2.0, abs=0.4)  # coarse steps; tests/test_terms.py is sharper
 
 
 def test_holding_costs_a_first_order() -> None:

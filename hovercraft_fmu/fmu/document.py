@@ -7,7 +7,7 @@ from pathlib import Path
 import jinja2
 
 from .._version import __version__
-from ..model.craft import PRESETS
+from ..model.craft import DRAG_AREAS, PRESETS
 from ..model.integrators import INTEGRATORS
 from .description import DESCRIPTION
 from .interface import VARIABLES, WARNINGS, Variable
@@ -31,6 +31,7 @@ def pages() -> dict[str, str]:
         "warnings": WARNINGS,
         "integrators": INTEGRATORS,
         "presets": PRESETS,
+        "drag_areas": DRAG_AREAS,
         "checked": [line.strip("| ").split(" | ") for line in checked if not line.startswith("| ---")],
         "measured": _all_measured(),
         "machine": _machine(),

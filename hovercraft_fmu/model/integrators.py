@@ -164,7 +164,7 @@ def _rk4_with_friction(state: State, controls: Controls, craft: Craft, h: float,
     near = NEAR_REST * larger(*friction_gains(craft, h, ns))
     drag = rotation = 0.0
     for _ in range(n):
-        at_rest = slip_speed(state.vx, state.vy, radius * state.yaw_rate, ns) <= near
+        at_rest = slip_speed(state.vx, state.vy, radius * state.yaw_rate, ns) < near
         if ns is not math:
             stretch = _either(
                 at_rest,

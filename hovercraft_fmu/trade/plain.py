@@ -3,14 +3,14 @@
 import math
 
 from ..model.craft import Craft
-from ..model.dynamics import Controls, LoadFunction, State, actuation
-from ..model.integrators import Stretch
+from ..model.dynamics import Controls, LoadFunction, Namespace, State, actuation
+from ..model.integrators import INTEGRATORS, Stretch
 
 
-def plain_euler(state: State, controls: Controls, craft: Craft, h: float, n: int) -> Stretch:
+def plain_euler(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math) -> Stretch:
     """n sub-steps of h [s] of semi-implicit Euler, with the default's drag and nothing else; one craft."""
     loads_at = _plain_loads(controls, craft)
-    mass, inertia = craft.mass, craft.inertia
+    mass, inertia, single = craft.mass, craft.inertia, ns is math
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
@@ -21,12 +21,13 @@ def plain_euler(state: State, controls: Controls, craft: Craft, h: float, n: int
         y = y + h * vy
         yaw_rate = yaw_rate + h * (moment / inertia)
         heading = heading + h * yaw_rate
-        if kq > most:
-            most = kq
-        if yaw_rate > right:
-            right = yaw_rate
-        elif yaw_rate < left:
-            left = yaw_rate
+        if single:
+            if kq > most:
+                most = kq
+            if yaw_rate > right:
+                right = yaw_rate
+            elif yaw_rate < left:
+                left = yaw_rate
     most = max(most, loads_at(heading, vx, vy, yaw_rate)[3])
     return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
@@ -48,3 +49,7 @@ def _plain_loads(controls: Controls, craft: Craft) -> LoadFunction:
         return c * force_x - s * force_y, s * force_x + c * force_y, x_d * drag_y + turn, kq
 
     return loads_at
+
+
+PLAIN = INTEGRATORS[0]._replace(name="plain_euler", integrate=plain_euler)
+"""As a row of the table of methods."""

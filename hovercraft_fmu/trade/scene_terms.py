@@ -16,12 +16,13 @@ from rich.table import Table
 
 from ..model.craft import DIRECTIONAL
 from ..model.dynamics import State
-from ..model.subcycling import advance, substeps
+from ..model.integrators import Integrator
+from ..model.subcycling import advance
 from ..scenes import SCENES, Row, Scene
 from ..simulation import Value, plan, schedule
 from ..view.plots import new_figure
 from ..view.tables import markdown
-from .plain import plain_euler
+from .plain import PLAIN
 from .work_precision import machine
 
 Tell = Callable[[float], None]
@@ -140,31 +141,18 @@ Walk = Callable[[], list[State]]
 """A run of the bare model, ready to be timed: the states at its communication points."""
 
 
-def walk(scene: Scene, settings: Mapping[str, Value]) -> Walk:
-    """The whole scene on the bare model, at its own communication points."""
+def walk(scene: Scene, settings: Mapping[str, Value], method: Integrator | None = None) -> Walk:
+    """The whole scene on the bare model, at its own communication points; with a method from outside the table."""
     run = plan(scene, start_values=settings)
     craft, chosen = run.craft, run.settings
+    if method:
+        chosen = chosen._replace(integrator=method)
     steps = [(end - time, controls) for time, end, controls in schedule(run)]
 
     def go() -> list[State]:
         states = [run.start]
         for duration, controls in steps:
             states.append(advance(states[-1], controls, craft, duration, chosen).state)
-        return states
-
-    return go
-
-
-def plain_walk(scene: Scene) -> Walk:
-    """The same with the default method at its sub-step, as it was before there were terms."""
-    run = plan(scene)
-    craft = run.craft
-    steps = [(*substeps(end - time, run.settings.step_size), controls) for time, end, controls in schedule(run)]
-
-    def go() -> list[State]:
-        states = [run.start]
-        for n, h, controls in steps:
-            states.append(plain_euler(states[-1], controls, craft, h, n).state)
         return states
 
     return go
@@ -201,7 +189,7 @@ def _interleaved(first: Walk, second: Walk, repeats: int) -> tuple[float, list[S
 
 def off_ratio() -> float:
     """What the terms cost where all are off: the default's time on `turn` over that of a copy from before them."""
-    ratio, _, _ = _interleaved(plain_walk(SCENES["turn"]), walk(SCENES["turn"], {}), OFF_REPEATS)
+    ratio, _, _ = _interleaved(walk(SCENES["turn"], {}, PLAIN), walk(SCENES["turn"], {}), OFF_REPEATS)
     return ratio
 
 
@@ -216,7 +204,7 @@ def run(folder: Path, tell: Tell = lambda _: None) -> Group:
         writer = csv.writer(file)
         writer.writerow(TermRow._fields)
         writer.writerows(rows)
-    (folder / "scene_terms.md").write_text(markdown(TITLES, _cells(rows)) + "\n", encoding="utf-8")
+    (folder / "scene_terms.md").write_text(markdown(_titles(rows), _cells(rows)) + "\n", encoding="utf-8")
     draw(rows, folder / "scene_terms.png")
     return Group(
         "Each term: its price, and how far the end of each scene moves with it", _table(rows),
@@ -228,12 +216,22 @@ def run(folder: Path, tell: Tell = lambda _: None) -> Group:
 
 SHOWN = ("turn", "ice", "drift_to_rest")
 """Scenes in the short table."""
-TITLES = ("term", "set to", "cost", *(f"end of `{name}` moves by" for name in SHOWN), "needed by")
 
 
 def price(rows: Sequence[TermRow], term: str) -> float:
     """The median of the cost ratios over the scenes."""
     return statistics.median(row.cost_ratio for row in rows if row.term == term)
+
+
+def _titles(rows: Sequence[TermRow]) -> tuple[str, ...]:
+    path = {row.scene: row.path for row in rows if row.term == "coarse step"}
+    return (
+        "term",
+        "set to",
+        "cost",
+        *(f"end of `{name}` ({path[name]:.0f} m) moves by" for name in SHOWN),
+        "needed by",
+    )
 
 
 def _cells(rows: Sequence[TermRow]) -> list[tuple[str, ...]]:
@@ -246,7 +244,7 @@ def _cells(rows: Sequence[TermRow]) -> list[tuple[str, ...]]:
 
 
 def _length(metres: float) -> str:
-    return f"{metres:.3g} m" if metres >= 1e-4 else f"{metres:.0e} m"
+    return "0" if metres == 0.0 else f"{metres:.3g} m" if metres >= 1e-4 else f"{metres:.0e} m"
 
 
 def _table(rows: Sequence[TermRow]) -> Table:
@@ -268,7 +266,7 @@ def draw(rows: Sequence[TermRow], path: Path) -> None:
     grid = np.array([[math.log10(max(moved[term, scene], 1e-6)) for scene in scenes] for term in terms])
     image = map_axes.imshow(grid, cmap="YlGnBu", vmin=-6.0, vmax=3.0, aspect="auto")
     for (i, term), (j, scene) in itertools.product(enumerate(terms), enumerate(scenes)):
-        dark = grid[i, j] > 0.5
+        dark = grid[i, j] > -0.2
         map_axes.text(j, i, _length(moved[term, scene]), ha="center", va="center", fontsize="small",
                       color="white" if dark else "black")  # fmt: skip
     map_axes.set_xticks(range(len(scenes)), scenes)

@@ -47,7 +47,7 @@ HOLDING_STEPS = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5)
 """s"""
 ORDER_STEPS = (0.1, 0.05, 0.025, 0.0125)
 """s: the range in which the observed orders are fitted; rk4 gets five times as long ones."""
-ORDER_SCENES = ("launch", "cycloid", "turn", "stop")
+ORDER_SCENES = ("launch", "cycloid", "turn", "crosswind", "stop", "drift_to_rest")
 REPEATS = 3
 
 Tell = Callable[[float], None]
@@ -262,7 +262,7 @@ class Order(NamedTuple):
 
 
 def observed_orders() -> list[Order]:
-    """On the smooth scenes (launch, cycloid, and turn, whose pulses start at whole seconds), and through a reversal."""
+    """On the smooth scenes (pulses start at whole seconds), through a reversal, and to rest with friction."""
     orders = []
     for scene in ORDER_SCENES:
         exact, _ = reference_end(SCENES[scene], STOP_TIME)

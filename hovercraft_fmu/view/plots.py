@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 CRAFT_COUNT = 25
 """Outlines along the path."""
-SEA, CRAFT, PORT, STARBOARD, SWAY = "#0b4f6c", "#d3e7f0b0", "#c8102e", "#2a9d4b", "#f08a24"
+SEA, CRAFT, PORT, STARBOARD, SWAY, WIND = "#0b4f6c", "#d3e7f0b0", "#c8102e", "#2a9d4b", "#f08a24", "#5b7f95"
 """Port is red, starboard is green, as at sea."""
 
 
@@ -64,12 +64,30 @@ def _draw_path(axes: "Axes", result: Result) -> None:
         c, s = np.cos(result["pose.heading"][i]), np.sin(result["pose.heading"][i])
         hull_x, hull_y = x[i] + c * body_x - s * body_y, y[i] + s * body_x + c * body_y
         axes.fill(hull_x, hull_y, facecolor=CRAFT, edgecolor=SEA, linewidth=0.9, zorder=3)
+    _draw_wind(axes, result)
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m], downward")
     axes.set_title(f"Path; the craft every {(result['time'][-1] - result['time'][0]) / (CRAFT_COUNT - 1):.3g} s")
     axes.grid(alpha=0.3)
+
+
+def _draw_wind(axes: "Axes", result: Result) -> None:
+    """Where there is any: an arrow for its mean, and its strength."""
+    wind_x, wind_y = result["wind.x"], result["wind.y"]
+    strength = np.hypot(wind_x, wind_y)
+    if not strength.any():
+        return
+    x, y = wind_x.mean(), wind_y.mean()
+    size = 0.06 / max(np.hypot(x, y), 1e-12)
+    axes.annotate(
+        "", (0.1 + size * x, 0.9 - size * y), (0.1 - size * x, 0.9 + size * y), xycoords="axes fraction",
+        arrowprops={"arrowstyle": "-|>", "color": WIND, "linewidth": 2.0},
+    )  # fmt: skip
+    low, high = strength.min(), strength.max()
+    text = f"{high:.3g}" if low == high else f"{low:.3g} ... {high:.3g}"
+    axes.text(0.19, 0.9, f"wind {text} m/s", transform=axes.transAxes, color=WIND, va="center")
 
 
 def _draw_controls(axes: "Axes", result: Result) -> None:
