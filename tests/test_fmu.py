@@ -45,13 +45,19 @@ SETTINGS: dict[str, dict[str, Any]] = {
 }
 
 
+EVERY_TERM: dict[str, Any] = {"drag_area": "directional", "rotational_drag": 0.5, "skirt_friction": 0.002, "gravity": 9.5}
+
+
 def planned() -> dict[str, Run]:
-    """Every scene with every method."""
-    return {
+    """Every scene with every method; and the one with wind once more, with every other term."""
+    runs = {
         f"{name} {method}": plan(name, start_values={**values, "integrator": method})
         for name in SCENES
         for method, values in SETTINGS.items()
     }
+    for method, values in SETTINGS.items():
+        runs[f"every term {method}"] = plan("crosswind", start_values={**values, **EVERY_TERM, "integrator": method})
+    return runs
 
 
 def write_runs(folder: Path) -> None:

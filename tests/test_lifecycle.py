@@ -527,6 +527,25 @@ def test_tunable_parameters_change_between_steps(instance: Any) -> None:
     assert get(instance, *STATES, "applied.thrust") == [*end, 3.0]
 
 
+def test_ground_and_wind_change_between_steps_and_come_back_with_the_state(instance: Any) -> None:
+    start(instance, velocity__x=1.0)
+    put(instance, thrust=0.0, skirt_friction=0.1, rotational_drag=0.3, wind__y=0.2)
+    instance.doStep(0.0, 0.5)
+    state, there = instance.serializeFMUstate(instance.getFMUstate()), everything(instance)
+    craft = Craft(skirt_friction=0.1, rotational_drag=0.3)
+    assert get(instance, *STATES) == list(advance(State(vx=1.0), Controls(0.0, wind_y=0.2), craft, 0.5).state)
+    instance.doStep(0.5, 5.0)  # to rest
+    assert get(instance, *STATES[3:], "force.x", "force.y", "moment", "acceleration.yaw") == [0.0] * 7
+    end = everything(instance)
+    put(instance, skirt_friction=0.0, wind__y=0.0, thrust=5.0)
+    instance.doStep(5.5, 1.0)
+    assert get(instance, "velocity.x")[0] > 0.01
+    instance.setFMUstate(instance.deSerializeFMUstate(state))
+    assert everything(instance) == there
+    instance.doStep(0.5, 5.0)
+    assert everything(instance) == end
+
+
 def test_the_default_time_may_be_off_by_a_rounding(instance: Any) -> None:
     start(instance)
     time = 0.0
