@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from ._version import __version__
+from .fmu.native_package import build_native_fmu, has_compiler
 from .fmu.package import build_fmu
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES
@@ -49,7 +50,7 @@ def commands(context: click.Context) -> None:
     \b
     New here?
       hovercraft-fmu demo                          build, check and drive it; see build/demo/
-      hovercraft-fmu build                         write build/Hovercraft.fmu
+      hovercraft-fmu build                         write build/Hovercraft.fmu and build/HovercraftNative.fmu
       hovercraft-fmu simulate --scene turn --plot turn.png
       hovercraft-fmu simulate --help               what can be set
     """
@@ -58,10 +59,22 @@ def commands(context: click.Context) -> None:
 
 
 @commands.command()
-def build() -> None:
-    """Write build/Hovercraft.fmu under the current folder."""
-    path = build_fmu()
-    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, FMI 2.0 co-simulation")
+@click.option("--native", is_flag=True, help="The native FMU alone.")
+def build(native: bool) -> None:
+    """Write build/Hovercraft.fmu and, where its compiler is installed, build/HovercraftNative.fmu.
+
+    The compiler of the native FMU: pip install 'hovercraft-fmu[native]'.
+    """
+    if not native:
+        _print_built(build_fmu(), "Python")
+    if native or has_compiler():
+        _print_built(build_native_fmu(), "native")
+    else:
+        OUTPUT.print("no native FMU: its compiler is not installed: pip install 'hovercraft-fmu\\[native]'")
+
+
+def _print_built(path: Path, flavour: str) -> None:
+    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, FMI 2.0 co-simulation, {flavour}")
 
 
 @commands.command("simulate")

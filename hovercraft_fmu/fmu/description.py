@@ -1,5 +1,8 @@
-"""The table of variables -> modelDescription.xml."""
+"""The table of variables -> modelDescription.xml, for both flavours of the FMU."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
 from xml.etree.ElementTree import Element, SubElement
 
 from .._version import RELEASE_DATE, __version__
@@ -30,12 +33,51 @@ CAPABILITIES = {
 LOG_CATEGORIES = {
     "logStatusWarning": "What the run survives but its user should know",
     "logStatusError": "A call that was refused",
-    "logStatusFatal": "A call that was refused, as pythonfmu's wrapper reports it: the instance must be freed",
     "logAll": "Everything",
 }
 
 
-def model_description(build: str) -> Element:
+@dataclass(frozen=True)
+class Flavour:
+    """What the two FMUs do not share."""
+
+    identifier: str
+    """FMI's modelIdentifier: the name of the binaries."""
+    tool: str
+    capabilities: Mapping[str, str]
+    categories: Mapping[str, str]
+    sources: tuple[str, ...] = ()
+    """Files of sources/ to compile."""
+
+
+PYTHON = Flavour(
+    identifier=MODEL_NAME,
+    tool="PythonFMU",
+    capabilities=MappingProxyType(CAPABILITIES),
+    categories=MappingProxyType(
+        {
+            "logStatusFatal": "A call that was refused, as pythonfmu's wrapper reports it: the instance must be freed",
+            **LOG_CATEGORIES,
+        }
+    ),
+)
+NATIVE = Flavour(
+    identifier=f"{MODEL_NAME}Native",
+    tool="zig cc",
+    capabilities=MappingProxyType(
+        {
+            **CAPABILITIES,
+            "canInterpolateInputs": "true",
+            "maxOutputDerivativeOrder": "1",
+            "canNotUseMemoryManagementFunctions": "false",
+        }
+    ),
+    categories=MappingProxyType(LOG_CATEGORIES),
+    sources=("fmi2.c", "instance.c", "kernel.c", "memory.c", "serialize.c", "text.c", "trig.c"),
+)
+
+
+def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
     """The description of the FMU whose content has the hexadecimal digest `build`, as an XML tree."""
     root = Element(
         "fmiModelDescription",
@@ -48,16 +90,16 @@ def model_description(build: str) -> Element:
             "version": __version__,
             "copyright": f"Copyright (c) {RELEASE_DATE[:4]} {AUTHOR}",
             "license": LICENSE,
-            "generationTool": f"hovercraft-fmu {__version__} with PythonFMU",
+            "generationTool": f"hovercraft-fmu {__version__} with {flavour.tool}",
             "generationDateAndTime": RELEASE_DATE,
             "variableNamingConvention": "structured",
         },
     )
-    SubElement(root, "CoSimulation", {"modelIdentifier": MODEL_NAME, **CAPABILITIES})
+    _co_simulation(root, flavour)
     _units(SubElement(root, "UnitDefinitions"))
     _types(SubElement(root, "TypeDefinitions"))
     categories = SubElement(root, "LogCategories")
-    for name, text in LOG_CATEGORIES.items():
+    for name, text in flavour.categories.items():
         SubElement(categories, "Category", {"name": name, "description": text})
     SubElement(
         root,
@@ -74,6 +116,14 @@ def model_description(build: str) -> Element:
 def guid(build: str) -> str:
     """A digest in the shape of a GUID."""
     return f"{{{build[:8]}-{build[8:12]}-{build[12:16]}-{build[16:20]}-{build[20:32]}}}"
+
+
+def _co_simulation(parent: Element, flavour: Flavour) -> None:
+    node = SubElement(parent, "CoSimulation", {"modelIdentifier": flavour.identifier, **flavour.capabilities})
+    if flavour.sources:
+        files = SubElement(node, "SourceFiles")
+        for name in flavour.sources:
+            SubElement(files, "File", {"name": name})
 
 
 def _units(parent: Element) -> None:

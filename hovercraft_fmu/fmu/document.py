@@ -17,13 +17,14 @@ RESULTS = FOLDER / "results"
 """What `hovercraft-fmu trade` and `hovercraft-fmu stability` wrote, with `--output` there."""
 
 
-def pages() -> dict[str, str]:
-    """Path inside the documentation -> the whole page."""
+def pages(native: bool = False) -> dict[str, str]:
+    """Path inside the documentation -> the whole page, for the Python FMU or the native one."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
     checked = (FOLDER / "checked.md").read_text(encoding="utf-8").splitlines()
     values = {
+        "native": native,
         "version": __version__,
         "description": DESCRIPTION,
         "variables": VARIABLES,

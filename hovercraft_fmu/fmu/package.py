@@ -6,7 +6,7 @@ import os
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -57,10 +57,15 @@ def build_fmu(path: str | os.PathLike[str] = f"build/{MODEL_NAME}.fmu") -> Path:
         ValueError: the name does not end in .fmu.
         OSError: the file cannot be written; one that stood there before still does.
     """
+    return write_fmu(path, _archive)
+
+
+def write_fmu(path: str | os.PathLike[str], make: Callable[[], bytes]) -> Path:
+    """Write what `make` makes to `path`. Raises as `build_fmu` does."""
     path = Path(path)
     if path.suffix != ".fmu":
         raise ValueError(f"path = {str(path)!r}: must end in .fmu")
-    content = _archive()
+    content = make()
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")
     try:
@@ -75,7 +80,7 @@ def _archive() -> bytes:
     sources = {f"{name.relative_to(PACKAGE).as_posix()}": name.read_bytes() for name in _traveling()}
     documents = _documents()
     icon = icon_png()
-    build = _digest({**sources, **documents, "model.png": icon, **_pythonfmu_files()})
+    build = digest({**sources, **documents, "model.png": icon, **_pythonfmu_files()})
     package = f"hovercraft_{build[:16]}"
     with tempfile.TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
         work = Path(folder)
@@ -100,13 +105,17 @@ def _traveling() -> list[Path]:
 
 
 def _documents() -> dict[str, bytes]:
+    return {**documents(native=False), "licenses/pythonfmu.txt": _pythonfmu_license()}
+
+
+def documents(native: bool) -> dict[str, bytes]:
+    """What both flavours have in documentation/, by path."""
     static = {
         path.relative_to(STATIC).as_posix(): path.read_bytes()
         for path in sorted(STATIC.rglob("*"))
-        if path.is_file() and path.suffix != ".jinja"
+        if path.is_file() and path.suffix != ".jinja" and not (native and path.name == "externalDependencies.txt")
     }
-    made = {name: page.encode() for name, page in pages().items()}
-    return {**static, **made, "licenses/pythonfmu.txt": _pythonfmu_license()}
+    return {**static, **{name: page.encode() for name, page in pages(native).items()}}
 
 
 def _pythonfmu_license() -> bytes:
@@ -121,11 +130,12 @@ def _pythonfmu_files() -> dict[str, bytes]:
     return {f"pythonfmu/{path.relative_to(home).as_posix()}": path.read_bytes() for path in paths}
 
 
-def _digest(files: Mapping[str, bytes]) -> str:
-    digest = hashlib.sha256()
+def digest(files: Mapping[str, bytes]) -> str:
+    """Hexadecimal, of names and contents."""
+    total = hashlib.sha256()
     for name in sorted(files):
-        digest.update(f"{name}\0{len(files[name])}\0".encode() + files[name])
-    return digest.hexdigest()[:32]
+        total.update(f"{name}\0{len(files[name])}\0".encode() + files[name])
+    return total.hexdigest()[:32]
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -157,13 +167,17 @@ def _taken_out(package: str) -> dict[str, ModuleType]:
 
 
 def _repacked(fmu: Path, package: str, icon: bytes) -> bytes:
-    """The archive in sorted order, without the times and permissions of the files it was made from."""
+    """The archive with pythonfmu moved, without the times and permissions of the files it was made from."""
     with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     files["model.png"] = icon
     # pythonfmu, too, gets a name of its own: a host may have imported another version of it
     moved = f"resources/{package}/pythonfmu/"
-    files = {name.replace("resources/pythonfmu/", moved, 1): content for name, content in files.items()}
+    return zipped({name.replace("resources/pythonfmu/", moved, 1): content for name, content in files.items()})
+
+
+def zipped(files: Mapping[str, bytes]) -> bytes:
+    """An archive of these files, the same whenever and wherever it is made."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in sorted(files):

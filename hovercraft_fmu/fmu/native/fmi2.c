@@ -1,0 +1,436 @@
+/* The FMI 2.0 co-simulation interface: it translates, and checks pointers; all else is the instance's. */
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+#include "instance.h"
+#include "memory.h"
+
+struct component {
+    struct instance instance;
+    fmi2CallbackFunctions callbacks;
+    bool warnings, errors; /* the categories that are logged */
+    char name[];
+};
+
+static const char *const WARNING_CATEGORY = "logStatusWarning";
+static const char *const ERROR_CATEGORY = "logStatusError";
+static const char *const ALL_CATEGORIES = "logAll";
+
+static fmi2Status status_of(enum verdict verdict)
+{
+    return verdict == FINE ? fmi2OK : verdict == WARNED ? fmi2Warning : fmi2Error;
+}
+
+/* A message is its own format: it never contains a '%'. */
+static void tell(void *sink, enum verdict verdict, const char *message)
+{
+    struct component *c = sink;
+    const bool wanted = verdict == WARNED ? c->warnings : c->errors;
+    if (wanted && c->callbacks.logger)
+        c->callbacks.logger(c->callbacks.componentEnvironment, c->name, status_of(verdict),
+                            verdict == WARNED ? WARNING_CATEGORY : ERROR_CATEGORY, message);
+}
+
+static void *allocate(const fmi2CallbackFunctions *callbacks, size_t size)
+{
+    return callbacks->allocateMemory && callbacks->freeMemory ? callbacks->allocateMemory(1, size)
+                                                              : memory_allocate(1, size);
+}
+
+static void release(const fmi2CallbackFunctions *callbacks, void *memory)
+{
+    if (callbacks->allocateMemory && callbacks->freeMemory)
+        callbacks->freeMemory(memory);
+    else
+        memory_release(memory);
+}
+
+static fmi2Status refuse(struct component *c, const char *call, const char *why)
+{
+    return status_of(instance_say(&c->instance, REFUSED, "%s: %s", call, why));
+}
+
+static fmi2Status refuse_null(struct component *c, const char *call)
+{
+    return refuse(c, call, "no argument must be NULL");
+}
+
+/* ---- general */
+
+const char *fmi2GetTypesPlatform(void)
+{
+    return fmi2TypesPlatform;
+}
+
+const char *fmi2GetVersion(void)
+{
+    return fmi2Version;
+}
+
+/* Without categories all of them. */
+fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean on, size_t n, const fmi2String categories[])
+{
+    struct component *c = component;
+    bool warnings = n == 0, errors = n == 0;
+    if (!c)
+        return fmi2Error;
+    for (size_t i = 0; i < n; i++) {
+        if (!categories || !categories[i])
+            return refuse_null(c, "fmi2SetDebugLogging");
+        const bool all = strcmp(categories[i], ALL_CATEGORIES) == 0;
+        const bool warning = strcmp(categories[i], WARNING_CATEGORY) == 0;
+        const bool error = strcmp(categories[i], ERROR_CATEGORY) == 0;
+        if (!all && !warning && !error)
+            return status_of(instance_say(&c->instance, REFUSED, "log category '%q': must be one of %s, %s, %s",
+                                          categories[i], WARNING_CATEGORY, ERROR_CATEGORY, ALL_CATEGORIES));
+        warnings = warnings || all || warning;
+        errors = errors || all || error;
+    }
+    if (warnings)
+        c->warnings = on;
+    if (errors)
+        c->errors = on;
+    return fmi2OK;
+}
+
+static bool is_acceptable(struct component *c, fmi2Type type, fmi2String guid)
+{
+    if (type != fmi2CoSimulation)
+        instance_say(&c->instance, REFUSED, "fmuType = %i: must be fmi2CoSimulation, %i", (long long)type,
+                     (long long)fmi2CoSimulation);
+    else if (!guid || strcmp(guid, GUID) != 0)
+        instance_say(&c->instance, REFUSED, "fmuGUID = '%q': must be '%s', as in modelDescription.xml",
+                     guid ? guid : "NULL", GUID);
+    else
+        return true;
+    return false;
+}
+
+/* Errors are told even where logging is off: an instance that fails without a word helps nobody. */
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
+{
+    static const fmi2CallbackFunctions none = {NULL, NULL, NULL, NULL, NULL};
+    const fmi2CallbackFunctions *callbacks = functions ? functions : &none;
+    const size_t length = name ? strlen(name) : 0;
+    struct component *c = allocate(callbacks, sizeof *c + length + 1);
+    (void)resources, (void)visible;
+    if (!c)
+        return NULL;
+    c->callbacks = *callbacks;
+    c->warnings = logging;
+    c->errors = true;
+    memcpy(c->name, name ? name : "", length);
+    c->name[length] = '\0';
+    instance_start(&c->instance, tell, c);
+    if (is_acceptable(c, type, guid))
+        return c;
+    release(callbacks, c);
+    return NULL;
+}
+
+void fmi2FreeInstance(fmi2Component component)
+{
+    struct component *c = component;
+    if (c) {
+        const fmi2CallbackFunctions callbacks = c->callbacks;
+        release(&callbacks, c);
+    }
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean tolerance_defined, fmi2Real tolerance,
+                               fmi2Real start_time, fmi2Boolean stop_time_defined, fmi2Real stop_time)
+{
+    struct component *c = component;
+    (void)stop_time_defined, (void)stop_time;
+    return c ? status_of(instance_set_up(&c->instance, "fmi2SetupExperiment", start_time, tolerance_defined != 0,
+                                         tolerance))
+             : fmi2Error;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component component)
+{
+    struct component *c = component;
+    return c ? status_of(instance_initialize(&c->instance, "fmi2EnterInitializationMode")) : fmi2Error;
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component component)
+{
+    struct component *c = component;
+    return c ? status_of(instance_go(&c->instance, "fmi2ExitInitializationMode")) : fmi2Error;
+}
+
+fmi2Status fmi2Terminate(fmi2Component component)
+{
+    struct component *c = component;
+    return c ? status_of(instance_terminate(&c->instance, "fmi2Terminate")) : fmi2Error;
+}
+
+fmi2Status fmi2Reset(fmi2Component component)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    instance_reset(&c->instance);
+    return fmi2OK;
+}
+
+/* ---- variables */
+
+fmi2Status fmi2GetReal(fmi2Component component, const fmi2ValueReference vr[], size_t n, fmi2Real value[])
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (n > 0 && (!vr || !value))
+        return refuse_null(c, "fmi2GetReal");
+    return status_of(instance_get_reals(&c->instance, vr, n, value));
+}
+
+fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (n > 0 && (!vr || !value))
+        return refuse_null(c, "fmi2SetReal");
+    return status_of(instance_set_reals(&c->instance, vr, n, value));
+}
+
+fmi2Status fmi2GetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t n, fmi2Integer value[])
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (n > 0 && (!vr || !value))
+        return refuse_null(c, "fmi2GetInteger");
+    return status_of(instance_get_integers(&c->instance, vr, n, value));
+}
+
+fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[])
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (n > 0 && (!vr || !value))
+        return refuse_null(c, "fmi2SetInteger");
+    return status_of(instance_set_integers(&c->instance, vr, n, value));
+}
+
+/* There are none of these types: an empty list is fine. */
+static fmi2Status none_of(struct component *c, const char *call, const char *kind, const fmi2ValueReference vr[],
+                          size_t n)
+{
+    if (!c)
+        return fmi2Error;
+    if (n == 0)
+        return fmi2OK;
+    return vr ? status_of(instance_no_such(&c->instance, kind, vr[0])) : refuse_null(c, call);
+}
+
+fmi2Status fmi2GetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[])
+{
+    (void)value;
+    return none_of(component, "fmi2GetBoolean", "Boolean", vr, n);
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[])
+{
+    (void)value;
+    return none_of(component, "fmi2SetBoolean", "Boolean", vr, n);
+}
+
+fmi2Status fmi2GetString(fmi2Component component, const fmi2ValueReference vr[], size_t n, fmi2String value[])
+{
+    (void)value;
+    return none_of(component, "fmi2GetString", "String", vr, n);
+}
+
+fmi2Status fmi2SetString(fmi2Component component, const fmi2ValueReference vr[], size_t n, const fmi2String value[])
+{
+    (void)value;
+    return none_of(component, "fmi2SetString", "String", vr, n);
+}
+
+/* ---- FMU state */
+
+fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *state)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (!state)
+        return refuse_null(c, "fmi2GetFMUstate");
+    if (!*state) /* else it is one from before, to be used again */
+        *state = allocate(&c->callbacks, sizeof(struct content));
+    if (!*state)
+        return refuse(c, "fmi2GetFMUstate", "no memory");
+    *(struct content *)*state = c->instance.now;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate state)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (!state)
+        return refuse_null(c, "fmi2SetFMUstate");
+    c->instance.now = *(const struct content *)state;
+    c->instance.last_step = FINE;
+    return fmi2OK;
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *state)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (state && *state) {
+        release(&c->callbacks, *state);
+        *state = NULL;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component component, fmi2FMUstate state, size_t *size)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (!state || !size)
+        return refuse_null(c, "fmi2SerializedFMUstateSize");
+    *size = serialized_size();
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (!state || !bytes)
+        return refuse_null(c, "fmi2SerializeFMUstate");
+    if (size < serialized_size())
+        return status_of(instance_say(&c->instance, REFUSED, "fmi2SerializeFMUstate: size = %u: must be %u bytes",
+                                      (unsigned long long)size, (unsigned long long)serialized_size()));
+    content_serialize(state, (unsigned char *)bytes);
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    struct component *c = component;
+    struct content content;
+    if (!c)
+        return fmi2Error;
+    if (!bytes || !state)
+        return refuse_null(c, "fmi2DeSerializeFMUstate");
+    if (instance_deserialize(&c->instance, (const unsigned char *)bytes, size, &content) == REFUSED)
+        return fmi2Error;
+    *state = allocate(&c->callbacks, sizeof content);
+    if (!*state)
+        return refuse(c, "fmi2DeSerializeFMUstate", "no memory");
+    *(struct content *)*state = content;
+    return fmi2OK;
+}
+
+/* ---- derivatives */
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2ValueReference unknown[], size_t n_unknown,
+                                        const fmi2ValueReference known[], size_t n_known, const fmi2Real d_known[],
+                                        fmi2Real d_unknown[])
+{
+    (void)unknown, (void)n_unknown, (void)known, (void)n_known, (void)d_known, (void)d_unknown;
+    return component ? refuse(component, "fmi2GetDirectionalDerivative", "providesDirectionalDerivative is false")
+                     : fmi2Error;
+}
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real value[])
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (n > 0 && (!vr || !order || !value))
+        return refuse_null(c, "fmi2SetRealInputDerivatives");
+    return status_of(instance_set_rates(&c->instance, vr, n, order, value));
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t n,
+                                        const fmi2Integer order[], fmi2Real value[])
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (n > 0 && (!vr || !order || !value))
+        return refuse_null(c, "fmi2GetRealOutputDerivatives");
+    return status_of(instance_get_rates(&c->instance, vr, n, order, value));
+}
+
+/* ---- the step */
+
+fmi2Status fmi2DoStep(fmi2Component component, fmi2Real point, fmi2Real step, fmi2Boolean no_set_state_before)
+{
+    struct component *c = component;
+    (void)no_set_state_before;
+    return c ? status_of(instance_step(&c->instance, "fmi2DoStep", point, step)) : fmi2Error;
+}
+
+fmi2Status fmi2CancelStep(fmi2Component component)
+{
+    return component ? refuse(component, "fmi2CancelStep", "must be called while a step is pending; none ever is")
+                     : fmi2Error;
+}
+
+fmi2Status fmi2GetStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Status *value)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (!value)
+        return refuse_null(c, "fmi2GetStatus");
+    if (kind != fmi2DoStepStatus)
+        return fmi2Discard;
+    *value = status_of(c->instance.last_step);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Real *value)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (!value)
+        return refuse_null(c, "fmi2GetRealStatus");
+    if (kind != fmi2LastSuccessfulTime)
+        return fmi2Discard;
+    *value = c->instance.now.time;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value)
+{
+    (void)kind; /* the standard has no status that is an integer */
+    return !component ? fmi2Error : value ? fmi2Discard : refuse_null(component, "fmi2GetIntegerStatus");
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Boolean *value)
+{
+    if (!component)
+        return fmi2Error;
+    if (!value)
+        return refuse_null(component, "fmi2GetBooleanStatus");
+    if (kind != fmi2Terminated)
+        return fmi2Discard;
+    *value = fmi2False; /* the craft never ends a run */
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component component, const fmi2StatusKind kind, fmi2String *value)
+{
+    (void)kind; /* there is one for pending steps alone */
+    return !component ? fmi2Error : value ? fmi2Discard : refuse_null(component, "fmi2GetStringStatus");
+}

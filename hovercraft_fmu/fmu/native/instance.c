@@ -1,0 +1,624 @@
+#include "instance.h"
+
+#include <math.h>
+#include <stdarg.h>
+
+#include "text.h"
+
+/* ---- what is said */
+
+enum verdict instance_say(struct instance *instance, enum verdict verdict, const char *format, ...)
+{
+    char message[TEXT_SIZE];
+    va_list values;
+    va_start(values, format);
+    text_format(message, format, values);
+    va_end(values);
+    instance->tell(instance->sink, verdict, message);
+    return verdict;
+}
+
+enum verdict instance_require(struct instance *instance, const char *call, enum phase phase)
+{
+    if (instance->now.phase == phase)
+        return FINE;
+    return instance_say(instance, REFUSED, "%s in state '%s': must be called in state '%s'", call,
+                        PHASE_NAMES[instance->now.phase], PHASE_NAMES[phase]);
+}
+
+enum verdict instance_no_such(struct instance *instance, const char *kind, unsigned reference)
+{
+    return instance_say(instance, REFUSED, "value reference %u: must be that of a variable of type %s",
+                        (unsigned long long)reference, kind);
+}
+
+bool instance_started(const struct instance *instance)
+{
+    return instance->now.phase == STEPPING || instance->now.phase == TERMINATED;
+}
+
+/* ---- life cycle */
+
+void instance_reset(struct instance *instance)
+{
+    const struct content empty = {.phase = INSTANTIATED, .moved = true, .acted = true};
+    instance->now = empty;
+    instance->last_step = FINE;
+    for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
+        if (VARIABLES[i].kind == REAL)
+            instance->now.reals[i] = VARIABLES[i].start;
+        else
+            instance->now.integers[i] = (int32_t)VARIABLES[i].start;
+    }
+}
+
+void instance_start(struct instance *instance, teller *tell, void *sink)
+{
+    instance->tell = tell;
+    instance->sink = sink;
+    instance_reset(instance);
+}
+
+static enum verdict check_tolerance(struct instance *instance, double tolerance)
+{
+    if (0.0 < tolerance && tolerance < INFINITY)
+        return FINE;
+    return instance_say(instance, REFUSED, "tolerance = %r: must be a finite number greater than 0", tolerance);
+}
+
+enum verdict instance_set_up(struct instance *instance, const char *call, double start_time, bool tolerance_given,
+                             double tolerance)
+{
+    if (instance_require(instance, call, INSTANTIATED) == REFUSED)
+        return REFUSED;
+    if (!isfinite(start_time))
+        return instance_say(instance, REFUSED, "startTime = %r s: must be a finite number", start_time);
+    if (tolerance_given && check_tolerance(instance, tolerance) == REFUSED)
+        return REFUSED;
+    instance->now.time = start_time;
+    instance->now.hosts_tolerance = tolerance_given ? tolerance : 0.0;
+    return FINE;
+}
+
+enum verdict instance_initialize(struct instance *instance, const char *call)
+{
+    if (instance_require(instance, call, INSTANTIATED) == REFUSED)
+        return REFUSED;
+    instance->now.phase = INITIALIZING;
+    return FINE;
+}
+
+/* The craft that the parameters make. */
+static enum verdict make_craft(struct instance *instance, struct craft *craft)
+{
+    const double *reals = instance->now.reals;
+    for (unsigned i = 0; i < CRAFT_COUNT; i++)
+        *(double *)((char *)craft + CRAFT_FIELDS[i].offset) = reals[CRAFT_FIELDS[i].reference];
+    if (craft->thrust_max - craft->thrust_min < 0.0)
+        return instance_say(instance, REFUSED, "thrust_min = %r N: must not be above thrust_max = %r N",
+                            craft->thrust_min, craft->thrust_max);
+    return FINE;
+}
+
+static struct controls inputs_of(const double *reals)
+{
+    return (struct controls){reals[V_THRUST], reals[V_PORT_THRUSTER], reals[V_STARBOARD_THRUSTER]};
+}
+
+static void get_state(const double *reals, struct state *state)
+{
+    *state = (struct state){reals[V_POSE_X],     reals[V_POSE_Y],     reals[V_POSE_HEADING],
+                            reals[V_VELOCITY_X], reals[V_VELOCITY_Y], reals[V_VELOCITY_YAW_RATE]};
+}
+
+static enum verdict take_up_start_values(struct instance *instance)
+{
+    struct content *now = &instance->now;
+    struct craft craft;
+    if (make_craft(instance, &craft) == REFUSED)
+        return REFUSED;
+    now->craft = craft;
+    now->settings = (struct settings){
+        now->reals[V_STEP_SIZE],
+        now->integers[V_INTEGRATOR],
+        now->hosts_tolerance > 0.0 ? now->hosts_tolerance : now->reals[V_TOLERANCE],
+    };
+    now->controls = inputs_of(now->reals);
+    get_state(now->reals, &now->state);
+    now->reals[V_PROJECTED_AREA] = projected_area(&craft);
+    now->tuned = false;
+    now->moved = now->acted = true;
+    return FINE;
+}
+
+enum verdict instance_go(struct instance *instance, const char *call)
+{
+    if (instance_require(instance, call, INITIALIZING) == REFUSED || take_up_start_values(instance) == REFUSED)
+        return REFUSED;
+    instance->now.phase = STEPPING;
+    return FINE;
+}
+
+enum verdict instance_terminate(struct instance *instance, const char *call)
+{
+    if (instance_require(instance, call, STEPPING) == REFUSED)
+        return REFUSED;
+    instance->now.phase = TERMINATED;
+    return FINE;
+}
+
+/* ---- the step */
+
+static enum verdict check_step(struct instance *instance, double point, double step)
+{
+    const double time = instance->now.time;
+    if (!(0.0 < step && step < INFINITY))
+        return instance_say(instance, REFUSED,
+                            "communicationStepSize = %r s: must be a finite number greater than 0", step);
+    if (point != time && !(fabs(point - time) <= SAME_TIME * larger(1.0, fabs(time))))
+        return instance_say(instance, REFUSED,
+                            "currentCommunicationPoint = %r s: must be where the last step ended, %r s", point, time);
+    return FINE;
+}
+
+/* Of what is not finite the velocities are told first: it is they that run away first. */
+static enum verdict refuse_motion(struct instance *instance, const struct stretch *stretch)
+{
+    const struct state *s = &stretch->state;
+    const double values[] = {s->vx, s->vy, s->yaw_rate, s->x, s->y, s->heading};
+    static const unsigned references[] = {V_VELOCITY_X, V_VELOCITY_Y, V_VELOCITY_YAW_RATE,
+                                          V_POSE_X,     V_POSE_Y,     V_POSE_HEADING};
+    unsigned i = 0;
+    while (i + 1 < STATE_COUNT && isfinite(values[i]))
+        i++;
+    return instance_say(instance, REFUSED,
+                        "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
+                        "stands; the motion is too fast for sub-steps of %r s: set a smaller step_size",
+                        VARIABLES[references[i]].name, values[i], instance->now.time, instance->now.time,
+                        stretch->substep);
+}
+
+static enum verdict refuse_step(struct instance *instance, enum outcome outcome, double step,
+                                const struct stretch *stretch)
+{
+    const struct settings *settings = &instance->now.settings;
+    if (outcome == TOO_MANY_SUBSTEPS)
+        return instance_say(instance, REFUSED,
+                            "communication step = %r s: must not need more than 10^9 sub-steps of step_size = %r s",
+                            step, settings->step_size);
+    if (outcome == STEP_TOO_SMALL)
+        return instance_say(instance, REFUSED,
+                            "step = %r s: must not fall below 1e-12 s to meet tolerance = %r; set a larger tolerance",
+                            stretch->substep, settings->tolerance);
+    return refuse_motion(instance, stretch);
+}
+
+/* Whether this warning was not yet given; then it is, now. */
+static bool is_first(struct instance *instance, int bit)
+{
+    const bool first = !(instance->now.integers[V_WARNINGS] & bit);
+    instance->now.integers[V_WARNINGS] |= bit;
+    return first;
+}
+
+static const struct method *method_of(const struct instance *instance)
+{
+    return &METHODS[instance->now.settings.integrator - 1];
+}
+
+static enum verdict warn_of_the_step(struct instance *instance)
+{
+    const struct content *now = &instance->now;
+    const struct method *method = method_of(instance);
+    const double number = stability_number(now->drag, &now->craft), rotation = now->rotation;
+    enum verdict verdict = FINE;
+    if (number > method->stability_limit && is_first(instance, STEP_UNSTABLE))
+        verdict = instance_say(instance, WARNED,
+                               "stability_number = %4: must not pass %r with %s; set a step_size below %3 s, or "
+                               "another integrator (said once)",
+                               number, method->stability_limit, method->name,
+                               now->settings.step_size * method->stability_limit / number);
+    if (rotation > method->rotation_limit && is_first(instance, STEP_TURNS))
+        verdict = instance_say(instance, WARNED,
+                               "rotation_per_substep = %4 rad: must not pass %r rad; set a step_size below %3 s, or "
+                               "the integrator adaptive (said once)",
+                               rotation, method->rotation_limit,
+                               now->settings.step_size * method->rotation_limit / rotation);
+    return verdict;
+}
+
+static enum verdict warn_of_held_inputs(struct instance *instance, const struct controls *controls)
+{
+    const struct controls limits = saturate(controls, &instance->now.craft);
+    const double values[] = {controls->thrust, controls->port, controls->starboard};
+    const double held[] = {limits.thrust, limits.port, limits.starboard};
+    enum verdict verdict = FINE;
+    for (unsigned i = 0; i < INPUT_COUNT; i++)
+        if (fabs(values[i] - held[i]) > HELD * larger(1.0, fabs(held[i])) && is_first(instance, INPUT_HELD))
+            verdict = instance_say(instance, WARNED, "%s = %r: is outside its limits and is held at %r (said once)",
+                                   VARIABLES[INPUTS[i]].name, values[i], held[i]);
+    return verdict;
+}
+
+static enum verdict count_substeps(struct instance *instance, int64_t n)
+{
+    int32_t *count = &instance->now.integers[V_SUBSTEPS];
+    if (n <= SUBSTEPS_MAX - (int64_t)*count) {
+        *count += (int32_t)n;
+        return FINE;
+    }
+    *count = SUBSTEPS_MAX;
+    if (!is_first(instance, COUNTER_STOPPED))
+        return FINE;
+    return instance_say(instance, WARNED, "substeps = %i: %s (said once)", (long long)SUBSTEPS_MAX,
+                        COUNTER_STOPPED_TEXT);
+}
+
+static enum verdict worse(enum verdict a, enum verdict b)
+{
+    return a > b ? a : b;
+}
+
+static bool is_finite_drive(const struct controls *c)
+{
+    return isfinite(c->thrust) && isfinite(c->port) && isfinite(c->starboard);
+}
+
+/* The inputs over the step. Refused: a ramp that leaves the range of numbers. */
+static enum verdict make_drive(struct instance *instance, double step, struct drive *drive, struct controls *end)
+{
+    const double *rates = instance->now.rates;
+    *drive = (struct drive){inputs_of(instance->now.reals), {rates[0], rates[1], rates[2]}, false};
+    drive->ramped = rates[0] != 0.0 || rates[1] != 0.0 || rates[2] != 0.0;
+    *end = controls_at(drive, step);
+    if (is_finite_drive(end))
+        return FINE;
+    return instance_say(instance, REFUSED, "input derivatives over %r s: must lead to finite inputs", step);
+}
+
+static enum verdict take_step(struct instance *instance, double point, double step)
+{
+    struct content *now = &instance->now;
+    struct drive drive;
+    struct controls end;
+    struct craft craft = now->craft;
+    struct stretch stretch = {.substeps = 0};
+    if (check_step(instance, point, step) == REFUSED)
+        return REFUSED;
+    if (now->tuned && make_craft(instance, &craft) == REFUSED)
+        return REFUSED;
+    if (make_drive(instance, step, &drive, &end) == REFUSED)
+        return REFUSED;
+    const enum outcome outcome =
+        advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
+    if (outcome != ADVANCED)
+        return refuse_step(instance, outcome, step, &stretch);
+    now->state = stretch.state;
+    now->proposed = stretch.proposed;
+    now->controls = end;
+    now->craft = craft;
+    now->tuned = false;
+    now->time = point + step;
+    now->moved = now->acted = true;
+    now->drag = larger(now->drag, stretch.drag);
+    now->rotation = larger(now->rotation, stretch.rotation);
+    now->reals[V_THRUST] = end.thrust; /* a ramp goes on from here */
+    now->reals[V_PORT_THRUSTER] = end.port;
+    now->reals[V_STARBOARD_THRUSTER] = end.starboard;
+    enum verdict verdict = count_substeps(instance, stretch.substeps);
+    verdict = worse(verdict, warn_of_the_step(instance));
+    verdict = worse(verdict, warn_of_held_inputs(instance, &drive.start));
+    return worse(verdict, warn_of_held_inputs(instance, &end));
+}
+
+enum verdict instance_step(struct instance *instance, const char *call, double point, double step)
+{
+    if (instance_require(instance, call, STEPPING) == REFUSED)
+        return REFUSED;
+    return instance->last_step = take_step(instance, point, step);
+}
+
+/* ---- variables */
+
+static enum verdict check_finite(struct instance *instance, const unsigned *references, unsigned n)
+{
+    for (unsigned i = 0; i < n; i++)
+        if (!isfinite(instance->now.reals[references[i]]))
+            return instance_say(instance, REFUSED, "%s = %r: must be a finite number; the motion is out of range",
+                                VARIABLES[references[i]].name, instance->now.reals[references[i]]);
+    return FINE;
+}
+
+/* Bring what is read of the motion up to the communication point. */
+static enum verdict observe_motion(struct instance *instance)
+{
+    struct content *now = &instance->now;
+    double *reals = now->reals;
+    if (!now->moved)
+        return FINE;
+    if (!instance_started(instance) && take_up_start_values(instance) == REFUSED)
+        return REFUSED;
+    const struct state *s = &now->state;
+    body_velocity(s, &reals[V_BODY_SURGE], &reals[V_BODY_SWAY]);
+    reals[V_SPEED] = sqrt(s->vx * s->vx + s->vy * s->vy);
+    if (check_finite(instance, MOTION, sizeof MOTION / sizeof *MOTION) == REFUSED)
+        return REFUSED;
+    reals[V_POSE_X] = s->x;
+    reals[V_POSE_Y] = s->y;
+    reals[V_POSE_HEADING] = s->heading;
+    reals[V_VELOCITY_X] = s->vx;
+    reals[V_VELOCITY_Y] = s->vy;
+    reals[V_VELOCITY_YAW_RATE] = s->yaw_rate;
+    now->moved = false;
+    return FINE;
+}
+
+/* And of what acts on the craft, which most hosts never ask for. */
+static enum verdict observe_action(struct instance *instance)
+{
+    struct content *now = &instance->now;
+    double *reals = now->reals;
+    if (!now->acted)
+        return FINE;
+    const struct loads loads = loads_on(&now->state, &now->controls, &now->craft);
+    reals[V_FORCE_X] = loads.x;
+    reals[V_FORCE_Y] = loads.y;
+    reals[V_MOMENT] = loads.moment;
+    reals[V_ACCELERATION_X] = loads.x / now->craft.mass;
+    reals[V_ACCELERATION_Y] = loads.y / now->craft.mass;
+    reals[V_ACCELERATION_YAW] = loads.moment / now->craft.inertia;
+    reals[V_APPLIED_THRUST] = saturate(&now->controls, &now->craft).thrust;
+    reals[V_APPLIED_STEERING] = steering(&now->controls, &now->craft);
+    reals[V_STABILITY_NUMBER] = stability_number(now->drag, &now->craft);
+    reals[V_ROTATION_PER_SUBSTEP] = now->rotation;
+    if (check_finite(instance, ACTION, sizeof ACTION / sizeof *ACTION) == REFUSED)
+        return REFUSED;
+    now->acted = false;
+    return FINE;
+}
+
+static bool is_real(unsigned reference)
+{
+    return reference < VARIABLE_COUNT && VARIABLES[reference].kind == REAL;
+}
+
+static bool is_integer(unsigned reference)
+{
+    return reference < VARIABLE_COUNT && VARIABLES[reference].kind != REAL;
+}
+
+/* Whether a variable is among ACTION or WATCHED. */
+static bool is_action(unsigned reference)
+{
+    for (unsigned i = 0; i < sizeof ACTION / sizeof *ACTION; i++)
+        if (ACTION[i] == reference)
+            return true;
+    for (unsigned i = 0; i < sizeof WATCHED / sizeof *WATCHED; i++)
+        if (WATCHED[i] == reference)
+            return true;
+    return false;
+}
+
+enum verdict instance_get_reals(struct instance *instance, const unsigned *references, size_t n, double *values)
+{
+    if (observe_motion(instance) == REFUSED)
+        return REFUSED;
+    for (size_t i = 0; i < n; i++) {
+        if (!is_real(references[i]))
+            return instance_no_such(instance, "Real", references[i]);
+        if (instance->now.acted && is_action(references[i]) && observe_action(instance) == REFUSED)
+            return REFUSED;
+    }
+    for (size_t i = 0; i < n; i++)
+        values[i] = instance->now.reals[references[i]];
+    return FINE;
+}
+
+enum verdict instance_get_integers(struct instance *instance, const unsigned *references, size_t n, int *values)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!is_integer(references[i]))
+            return instance_no_such(instance, "Integer or Enumeration", references[i]);
+    for (size_t i = 0; i < n; i++)
+        values[i] = instance->now.integers[references[i]];
+    return FINE;
+}
+
+/* NULL where the value can be, else why not. */
+static const char *broken_rule(enum rule rule, double value)
+{
+    switch (rule) {
+    case POSITIVE:
+        return value > 0.0 ? NULL : "must be greater than 0";
+    case NOT_NEGATIVE:
+        return value < 0.0 ? "must not be negative" : NULL;
+    case FRACTION:
+        return -0.5 <= value && value <= 0.5 ? NULL : "must be from -0.5 (stern) to 0.5 (bow)";
+    case STEP_SIZE_RULE:
+    case TOLERANCE_RULE:
+        return value > 0.0 ? NULL : "must be a finite number greater than 0";
+    case INTEGRATOR_RULE:
+        return 1.0 <= value && value <= (double)(sizeof METHODS / sizeof *METHODS) ? NULL
+                                                                                   : "must be one of " INTEGRATOR_LIST;
+    case ANY:
+        break;
+    }
+    return NULL;
+}
+
+static enum verdict check_settable(struct instance *instance, const struct variable *variable, bool integer,
+                                   double value)
+{
+    if (variable->settable >> instance->now.phase & 1u)
+        return FINE;
+    const char *format = integer ? "%s = %i: must not be set in state '%s' (%s)"
+                                 : "%s = %r: must not be set in state '%s' (%s)";
+    if (integer)
+        return instance_say(instance, REFUSED, format, variable->name, (long long)value,
+                            PHASE_NAMES[instance->now.phase], variable->role);
+    return instance_say(instance, REFUSED, format, variable->name, value, PHASE_NAMES[instance->now.phase],
+                        variable->role);
+}
+
+static enum verdict check_real(struct instance *instance, const struct variable *variable, double value)
+{
+    if (check_settable(instance, variable, false, value) == REFUSED)
+        return REFUSED;
+    if (!isfinite(value))
+        return instance_say(instance, REFUSED, "%s = %r: must be a finite number", variable->name, value);
+    const char *why = broken_rule(variable->rule, value);
+    if (why)
+        return instance_say(instance, REFUSED, variable->rule == STEP_SIZE_RULE ? "%s = %r s: %s" : "%s = %r: %s",
+                            variable->name, value, why);
+    return FINE;
+}
+
+/* What is read belongs to the communication point: in step mode it changes with the next step, not now. */
+static void after_set(struct instance *instance, bool parameter)
+{
+    if (instance->now.phase == STEPPING)
+        instance->now.tuned = instance->now.tuned || parameter;
+    else
+        instance->now.moved = instance->now.acted = true;
+}
+
+/* Which input a reference is, or INPUT_COUNT. */
+static unsigned input_of(unsigned reference)
+{
+    unsigned i = 0;
+    while (i < INPUT_COUNT && INPUTS[i] != reference)
+        i++;
+    return i;
+}
+
+enum verdict instance_set_reals(struct instance *instance, const unsigned *references, size_t n, const double *values)
+{
+    bool parameter = false;
+    for (size_t i = 0; i < n; i++) { /* all are checked before one is set */
+        if (!is_real(references[i]))
+            return instance_no_such(instance, "Real", references[i]);
+        if (check_real(instance, &VARIABLES[references[i]], values[i]) == REFUSED)
+            return REFUSED;
+    }
+    for (size_t i = 0; i < n; i++) {
+        const unsigned input = input_of(references[i]);
+        instance->now.reals[references[i]] = values[i];
+        if (input < INPUT_COUNT)
+            instance->now.rates[input] = 0.0;
+        else
+            parameter = true;
+    }
+    if (n > 0)
+        after_set(instance, parameter);
+    return FINE;
+}
+
+enum verdict instance_set_integers(struct instance *instance, const unsigned *references, size_t n, const int *values)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (!is_integer(references[i]))
+            return instance_no_such(instance, "Integer or Enumeration", references[i]);
+        const struct variable *variable = &VARIABLES[references[i]];
+        if (check_settable(instance, variable, true, values[i]) == REFUSED)
+            return REFUSED;
+        const char *why = broken_rule(variable->rule, values[i]);
+        if (why)
+            return instance_say(instance, REFUSED, "%s = %i: %s", variable->name, (long long)values[i], why);
+    }
+    for (size_t i = 0; i < n; i++)
+        instance->now.integers[references[i]] = values[i];
+    if (n > 0)
+        after_set(instance, true);
+    return FINE;
+}
+
+/* ---- derivatives */
+
+static enum verdict check_order(struct instance *instance, unsigned reference, int order)
+{
+    if (order == 1)
+        return FINE;
+    return instance_say(instance, REFUSED, "order = %i of the derivative of %s: must be 1", (long long)order,
+                        VARIABLES[reference].name);
+}
+
+enum verdict instance_set_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
+                                const double *values)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (input_of(references[i]) == INPUT_COUNT)
+            return instance_say(instance, REFUSED, "value reference %u: must be that of an input to have a derivative",
+                                (unsigned long long)references[i]);
+        const struct variable *variable = &VARIABLES[references[i]];
+        if (check_settable(instance, variable, false, values[i]) == REFUSED ||
+            check_order(instance, references[i], orders[i]) == REFUSED)
+            return REFUSED;
+        if (!isfinite(values[i]))
+            return instance_say(instance, REFUSED, "derivative of %s = %r: must be a finite number", variable->name,
+                                values[i]);
+    }
+    for (size_t i = 0; i < n; i++)
+        instance->now.rates[input_of(references[i])] = values[i];
+    return FINE;
+}
+
+/* The derivative of an output at the communication point, after observe_motion and observe_action. */
+static bool output_rate(const double *reals, unsigned reference, double *rate)
+{
+    const double vx = reals[V_VELOCITY_X], vy = reals[V_VELOCITY_Y], r = reals[V_VELOCITY_YAW_RATE];
+    const double ax = reals[V_ACCELERATION_X], ay = reals[V_ACCELERATION_Y], speed = reals[V_SPEED];
+    const struct state acceleration = {.heading = reals[V_POSE_HEADING], .vx = ax, .vy = ay};
+    double forward, sideways;
+    switch (reference) {
+    case V_POSE_X:
+        *rate = vx;
+        return true;
+    case V_POSE_Y:
+        *rate = vy;
+        return true;
+    case V_POSE_HEADING:
+        *rate = r;
+        return true;
+    case V_VELOCITY_X:
+        *rate = ax;
+        return true;
+    case V_VELOCITY_Y:
+        *rate = ay;
+        return true;
+    case V_VELOCITY_YAW_RATE:
+        *rate = reals[V_ACCELERATION_YAW];
+        return true;
+    case V_BODY_SURGE: /* the body frame turns: d(u)/dt = a_x + r*v, d(v)/dt = a_y - r*u */
+        body_velocity(&acceleration, &forward, &sideways);
+        *rate = forward + r * reals[V_BODY_SWAY];
+        return true;
+    case V_BODY_SWAY:
+        body_velocity(&acceleration, &forward, &sideways);
+        *rate = sideways - r * reals[V_BODY_SURGE];
+        return true;
+    case V_SPEED: /* at rest it can only grow */
+        *rate = speed > 0.0 ? (vx / speed) * ax + (vy / speed) * ay : sqrt(ax * ax + ay * ay);
+        return true;
+    default:
+        return false;
+    }
+}
+
+enum verdict instance_get_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
+                                double *values)
+{
+    double unused;
+    if (observe_motion(instance) == REFUSED || observe_action(instance) == REFUSED)
+        return REFUSED;
+    for (size_t i = 0; i < n; i++) {
+        if (!output_rate(instance->now.reals, references[i], &unused))
+            return instance_say(instance, REFUSED,
+                                "value reference %u: must be that of an output to have a derivative",
+                                (unsigned long long)references[i]);
+        if (check_order(instance, references[i], orders[i]) == REFUSED)
+            return REFUSED;
+    }
+    for (size_t i = 0; i < n; i++)
+        output_rate(instance->now.reals, references[i], &values[i]);
+    return FINE;
+}

@@ -1,0 +1,427 @@
+#include "kernel.h"
+
+#include <math.h>
+
+#ifndef HOVERCRAFT_LIBM
+#include "trig.h"
+#endif
+
+static const double MIN_STEP = 1e-12;     /* s: below it the adaptive method gives up */
+static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
+static const double WHOLE = 1e-9;         /* relative: this close to a whole number of sub-steps is that number */
+static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds what is smaller, ties to even */
+
+/* With HOVERCRAFT_LIBM the platform's functions, which Python uses, too. */
+static inline void sine_cosine(double angle, double *sine, double *cosine)
+{
+#ifdef HOVERCRAFT_LIBM
+    *cosine = cos(angle);
+    *sine = sin(angle);
+#else
+    trig_sine_cosine(angle, sine, cosine);
+#endif
+}
+
+/* Python's min(a, b). */
+static inline double smaller(double a, double b)
+{
+    return b < a ? b : a;
+}
+
+/* ---- craft.py */
+
+double projected_area(const struct craft *craft)
+{
+    return (craft->length + craft->width) / 2.0 * craft->height;
+}
+
+double drag_factor(const struct craft *craft)
+{
+    return 0.5 * craft->air_density * projected_area(craft) * craft->drag_coefficient;
+}
+
+double drag_center(const struct craft *craft)
+{
+    return craft->drag_center_fraction * craft->length;
+}
+
+static double thruster_moment(const struct craft *craft)
+{
+    return 0.5 * craft->length * craft->steering_force;
+}
+
+/* ---- dynamics.py */
+
+static double clip(double value, double low, double high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+struct controls saturate(const struct controls *controls, const struct craft *craft)
+{
+    return (struct controls){
+        clip(controls->thrust, craft->thrust_min, craft->thrust_max),
+        clip(controls->port, 0.0, 1.0),
+        clip(controls->starboard, 0.0, 1.0),
+    };
+}
+
+double steering(const struct controls *controls, const struct craft *craft)
+{
+    const struct controls held = saturate(controls, craft);
+    return craft->steering_force * (held.port - held.starboard);
+}
+
+struct controls controls_at(const struct drive *drive, double time)
+{
+    if (!drive->ramped)
+        return drive->start;
+    return (struct controls){
+        drive->start.thrust + time * drive->rate.thrust,
+        drive->start.port + time * drive->rate.port,
+        drive->start.starboard + time * drive->rate.starboard,
+    };
+}
+
+/* All that the loads need and that does not change from sub-step to sub-step; `steer` renews the controls' part. */
+struct load_function {
+    double k, x_d;
+    double thrust, side, turn; /* N, N, N.m */
+    const struct craft *craft;
+    const struct drive *drive;
+};
+
+static void steer(struct load_function *f, const struct controls *controls)
+{
+    const struct controls held = saturate(controls, f->craft);
+    f->thrust = held.thrust;
+    f->side = f->craft->steering_force * (held.port - held.starboard);
+    f->turn = thruster_moment(f->craft) * (held.port - held.starboard);
+}
+
+/* The controls at a time [s] after the start of the communication step. */
+static inline void steer_at(struct load_function *f, double time)
+{
+    if (f->drive->ramped) {
+        const struct controls controls = controls_at(f->drive, time);
+        steer(f, &controls);
+    }
+}
+
+static struct load_function load_function(const struct drive *drive, const struct craft *craft)
+{
+    struct load_function f = {.k = drag_factor(craft), .x_d = drag_center(craft), .craft = craft, .drive = drive};
+    steer(&f, &drive->start);
+    return f;
+}
+
+static inline struct loads loads_at(const struct load_function *f, double heading, double vx, double vy,
+                                    double yaw_rate)
+{
+    double c, s;
+    sine_cosine(heading, &s, &c);
+    const double u = c * vx + s * vy;
+    const double w = c * vy - s * vx + yaw_rate * f->x_d;
+    const double kq = f->k * sqrt(u * u + w * w);
+    const double drag_y = -kq * w;
+    const double force_x = f->thrust - kq * u;
+    const double force_y = drag_y + f->side;
+    return (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, f->x_d * drag_y + f->turn, kq};
+}
+
+struct loads loads_on(const struct state *state, const struct controls *controls, const struct craft *craft)
+{
+    const struct drive drive = {.start = *controls};
+    const struct load_function f = load_function(&drive, craft);
+    return loads_at(&f, state->heading, state->vx, state->vy, state->yaw_rate);
+}
+
+void body_velocity(const struct state *state, double *surge, double *sway)
+{
+    double c, s;
+    sine_cosine(state->heading, &s, &c);
+    *surge = c * state->vx + s * state->vy;
+    *sway = c * state->vy - s * state->vx;
+}
+
+/* ---- integrators.py */
+
+/* What is watched over a stretch. */
+struct watch {
+    double most;    /* kg/s: k*q */
+    double fastest; /* rad/s */
+};
+
+static inline void look(struct watch *watch, double kq, double yaw_rate)
+{
+    if (kq > watch->most)
+        watch->most = kq;
+    if (!(-watch->fastest <= yaw_rate && yaw_rate <= watch->fastest))
+        watch->fastest = fabs(yaw_rate);
+}
+
+/* n sub-steps in about six blocks, of which `done` are over: the size of the next. */
+static int64_t next_block(int64_t n, int64_t done)
+{
+    const int64_t size = n / 5 | 1, left = n - done;
+    if (done == 0)
+        return n < 1 ? n : 1;
+    return left < size ? left : size;
+}
+
+static struct stretch stretch_of(const struct load_function *f, const struct state *s, int64_t n, double h,
+                                 const struct watch *watch)
+{
+    const double most = larger(watch->most, loads_at(f, s->heading, s->vx, s->vy, s->yaw_rate).kq);
+    return (struct stretch){*s, n, h * most, h * watch->fastest, 0.0, h};
+}
+
+static struct stretch semi_implicit_euler(const struct state *state, struct load_function *f, double h, int64_t n)
+{
+    const double mass = f->craft->mass, inertia = f->craft->inertia;
+    struct state s = *state;
+    struct watch watch = {0.0, fabs(s.yaw_rate)};
+    for (int64_t i = 0, block; i < n;) {
+        struct loads loads = {0};
+        for (block = next_block(n, i); block > 0; block--, i++) {
+            steer_at(f, (double)i * h);
+            loads = loads_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
+            s.vx = s.vx + h * (loads.x / mass);
+            s.vy = s.vy + h * (loads.y / mass);
+            s.x = s.x + h * s.vx;
+            s.y = s.y + h * s.vy;
+            s.yaw_rate = s.yaw_rate + h * (loads.moment / inertia);
+            s.heading = s.heading + h * s.yaw_rate;
+        }
+        look(&watch, loads.kq, s.yaw_rate);
+    }
+    return stretch_of(f, &s, n, h, &watch);
+}
+
+/* k*q from the sine and cosine that the step has anyway: the same arithmetic as in loads_at. */
+static inline double drag_per_speed(const struct load_function *f, double c, double s, double vx, double vy,
+                                    double yaw_rate)
+{
+    const double u = c * vx + s * vy;
+    const double w = c * vy - s * vx + yaw_rate * f->x_d;
+    return f->k * sqrt(u * u + w * w);
+}
+
+static struct stretch drag_implicit(const struct state *state, struct load_function *f, double h, int64_t n)
+{
+    const double mass = f->craft->mass, inertia = f->craft->inertia, x_d = f->x_d;
+    const double spread = inertia + mass * x_d * x_d;
+    struct state z = *state;
+    struct watch watch = {0.0, fabs(z.yaw_rate)};
+    for (int64_t i = 0, block; i < n;) {
+        double kq = 0.0;
+        for (block = next_block(n, i); block > 0; block--, i++) {
+            double c, s;
+            steer_at(f, (double)i * h);
+            sine_cosine(z.heading, &s, &c);
+            kq = drag_per_speed(f, c, s, z.vx, z.vy, z.yaw_rate);
+            const double g = h * kq;
+            const double surge = (mass * (c * z.vx + s * z.vy) + h * f->thrust) / (mass + g);
+            const double a = mass * (c * z.vy - s * z.vx) + h * f->side;
+            const double b = inertia * z.yaw_rate + h * f->turn;
+            const double e = x_d * a - b;
+            const double determinant = mass * inertia + g * spread;
+            const double sway = (inertia * a + g * x_d * e) / determinant;
+            z.yaw_rate = (mass * b - g * e) / determinant;
+            z.vx = c * surge - s * sway;
+            z.vy = s * surge + c * sway;
+            z.x = z.x + h * z.vx;
+            z.y = z.y + h * z.vy;
+            z.heading = z.heading + h * z.yaw_rate;
+        }
+        look(&watch, kq, z.yaw_rate);
+    }
+    return stretch_of(f, &z, n, h, &watch);
+}
+
+/* The accelerations in place of the loads. */
+static inline struct loads accelerations_at(const struct load_function *f, double heading, double vx, double vy,
+                                            double yaw_rate)
+{
+    const struct loads loads = loads_at(f, heading, vx, vy, yaw_rate);
+    return (struct loads){loads.x / f->craft->mass, loads.y / f->craft->mass, loads.moment / f->craft->inertia,
+                          loads.kq};
+}
+
+static struct stretch rk4(const struct state *state, struct load_function *f, double h, int64_t n)
+{
+    const double half = 0.5 * h, sixth = h / 6.0, square = h * h / 6.0;
+    struct state s = *state;
+    struct watch watch = {0.0, fabs(s.yaw_rate)};
+    for (int64_t i = 0, block; i < n;) {
+        double kq = 0.0;
+        for (block = next_block(n, i); block > 0; block--, i++) {
+            const double t = (double)i * h;
+            steer_at(f, t);
+            const struct loads a1 = accelerations_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
+            const double r2 = s.yaw_rate + half * a1.moment;
+            steer_at(f, t + half);
+            const struct loads a2 = accelerations_at(f, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
+                                                     s.vy + half * a1.y, r2);
+            const double r3 = s.yaw_rate + half * a2.moment;
+            const struct loads a3 =
+                accelerations_at(f, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
+            const double r4 = s.yaw_rate + h * a3.moment;
+            steer_at(f, t + h);
+            const struct loads a4 = accelerations_at(f, s.heading + h * r3, s.vx + h * a3.x, s.vy + h * a3.y, r4);
+            s.x = s.x + h * s.vx + square * (a1.x + a2.x + a3.x);
+            s.y = s.y + h * s.vy + square * (a1.y + a2.y + a3.y);
+            s.heading = s.heading + h * s.yaw_rate + square * (a1.moment + a2.moment + a3.moment);
+            s.vx = s.vx + sixth * (a1.x + 2.0 * a2.x + 2.0 * a3.x + a4.x);
+            s.vy = s.vy + sixth * (a1.y + 2.0 * a2.y + 2.0 * a3.y + a4.y);
+            s.yaw_rate = s.yaw_rate + sixth * (a1.moment + 2.0 * a2.moment + 2.0 * a3.moment + a4.moment);
+            kq = a1.kq;
+        }
+        look(&watch, kq, s.yaw_rate);
+    }
+    return stretch_of(f, &s, n, h, &watch);
+}
+
+enum { STAGES = 7, COMPONENTS = 6 };
+/* Dormand, Prince (1980): the pair 5(4); row i leads to stage i + 1. */
+static const double WEIGHTS[STAGES - 1][STAGES - 1] = {
+    {1.0 / 5},
+    {3.0 / 40, 9.0 / 40},
+    {44.0 / 45, -56.0 / 15, 32.0 / 9},
+    {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
+    {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
+    {35.0 / 384, 0.0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84},
+};
+/* Where in the step a stage lies. */
+static const double NODES[STAGES - 1] = {1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1.0, 1.0};
+/* Fifth order minus fourth order. */
+static const double ERROR[STAGES] = {71.0 / 57600,      0.0,         -71.0 / 16695, 71.0 / 1920,
+                                     -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
+
+/* The derivative of the state, in its order, and k*q there. */
+struct rates {
+    double of[COMPONENTS];
+    double kq;
+};
+
+static struct rates rates_at(const struct load_function *f, const double y[COMPONENTS])
+{
+    const struct loads a = accelerations_at(f, y[2], y[3], y[4], y[5]);
+    return (struct rates){{y[3], y[4], y[5], a.x, a.y, a.moment}, a.kq};
+}
+
+static double combined(const double *weights, int n, const struct rates *stages, int i)
+{
+    double total = weights[0] * stages[0].of[i];
+    for (int k = 1; k < n; k++)
+        total += weights[k] * stages[k].of[i];
+    return total;
+}
+
+/* One step from `time`: the new state, the rates there in stages[6], and the largest component of the error. */
+static double dormand_prince(struct load_function *f, double time, const double y[COMPONENTS], double h,
+                             struct rates stages[STAGES], double new[COMPONENTS])
+{
+    double error = 0.0, sum = 0.0;
+    for (int row = 0; row < STAGES - 1; row++) {
+        for (int i = 0; i < COMPONENTS; i++)
+            new[i] = y[i] + h * combined(WEIGHTS[row], row + 1, stages, i);
+        steer_at(f, time + NODES[row] * h);
+        stages[row + 1] = rates_at(f, new);
+    }
+    for (int i = 0; i < COMPONENTS; i++) {
+        const double part = fabs(h * combined(ERROR, STAGES, stages, i));
+        error = i ? larger(error, part) : part;
+        sum += new[i];
+    }
+    return isfinite(sum) ? error : INFINITY;
+}
+
+static enum outcome adaptive(const struct state *state, struct load_function *f, double duration, double tolerance,
+                             double proposed, struct stretch *stretch)
+{
+    double y[COMPONENTS] = {state->x, state->y, state->heading, state->vx, state->vy, state->yaw_rate};
+    double time = 0.0, most = 0.0, fastest = 0.0;
+    int64_t count = 0;
+    struct rates stages[STAGES];
+    stages[0] = rates_at(f, y);
+    while (time < duration) {
+        const bool last = proposed >= duration - time;
+        const double h = last ? duration - time : proposed;
+        double new[COMPONENTS];
+        const double error = dormand_prince(f, time, y, h, stages, new);
+        if (!(error <= tolerance)) {
+            proposed = error < INFINITY ? h * larger(0.2, 0.9 * sqrt(sqrt(tolerance / error))) : 0.2 * h;
+            if (proposed < MIN_STEP) {
+                stretch->substep = proposed;
+                return STEP_TOO_SMALL;
+            }
+            continue;
+        }
+        most = larger(most, h * stages[0].kq);
+        fastest = larger(fastest, h * fabs(y[5]));
+        time = last ? duration : time + h;
+        for (int i = 0; i < COMPONENTS; i++)
+            y[i] = new[i];
+        stages[0] = stages[STAGES - 1];
+        count++;
+        most = larger(most, h * stages[0].kq);
+        fastest = larger(fastest, h * fabs(y[5]));
+        if (!last)
+            proposed = h * smaller(5.0, error > 0.0 ? 0.9 * sqrt(sqrt(tolerance / error)) : 5.0);
+    }
+    *stretch = (struct stretch){{y[0], y[1], y[2], y[3], y[4], y[5]}, count, most, fastest, proposed, 0.0};
+    return ADVANCED;
+}
+
+/* ---- subcycling.py */
+
+/* Number and size [s] of the sub-steps of a communication step; false where they are too many. */
+static bool substeps(double communication_step, double step_size, int64_t *n, double *h)
+{
+    const double ratio = communication_step / step_size;
+    if (!(ratio <= MAX_SUBSTEPS + 1.0))
+        return false;
+    double whole = larger(1.0, ratio + TO_INTEGER - TO_INTEGER);
+    if (fabs(whole * step_size - communication_step) <= WHOLE * communication_step) {
+        *h = step_size;
+    } else {
+        const double down = (double)(int64_t)ratio;
+        whole = larger(1.0, down < ratio ? down + 1.0 : down);
+        *h = communication_step / whole;
+    }
+    *n = (int64_t)whole;
+    return whole <= MAX_SUBSTEPS;
+}
+
+static bool is_finite(const struct state *s)
+{
+    return isfinite(s->x) && isfinite(s->y) && isfinite(s->heading) && isfinite(s->vx) && isfinite(s->vy) &&
+           isfinite(s->yaw_rate);
+}
+
+enum outcome advance(const struct state *state, const struct drive *drive, const struct craft *craft,
+                     double communication_step, const struct settings *settings, double proposed,
+                     struct stretch *stretch)
+{
+    struct load_function f = load_function(drive, craft);
+    int64_t n;
+    double h;
+    if (settings->integrator == ADAPTIVE)
+        return adaptive(state, &f, communication_step, settings->tolerance,
+                        proposed != 0.0 ? proposed : settings->step_size, stretch);
+    if (!substeps(communication_step, settings->step_size, &n, &h))
+        return TOO_MANY_SUBSTEPS;
+    *stretch = settings->integrator == RK4             ? rk4(state, &f, h, n)
+               : settings->integrator == DRAG_IMPLICIT ? drag_implicit(state, &f, h, n)
+                                                       : semi_implicit_euler(state, &f, h, n);
+    if (isinf(stretch->state.heading)) /* its sine is no number; in Python it raises, and nothing is left */
+        stretch->state = (struct state){NAN, NAN, NAN, NAN, NAN, NAN};
+    return is_finite(&stretch->state) ? ADVANCED : NOT_FINITE;
+}
+
+double stability_number(double drag, const struct craft *craft)
+{
+    const double x_d = drag_center(craft);
+    return 2.0 * drag * (1.0 / craft->mass + x_d * x_d / craft->inertia);
+}

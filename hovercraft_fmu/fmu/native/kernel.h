@@ -1,0 +1,98 @@
+/* The physics: model/craft.py, dynamics.py, integrators.py and subcycling.py, function by function, in the same order
+   of operations. Derivations stand there. SI units, world frame: x right, y down, heading from +x toward +y.
+
+   It owns nothing and remembers nothing. Compile without contraction (-ffp-contract=off). */
+
+#ifndef HOVERCRAFT_KERNEL_H
+#define HOVERCRAFT_KERNEL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Constants of one craft, in the order of craft.py; the caller has checked them. */
+struct craft {
+    double mass;                 /* kg */
+    double inertia;              /* kg.m2 */
+    double length;               /* m */
+    double width;                /* m */
+    double height;               /* m */
+    double drag_coefficient;     /* 1 */
+    double air_density;          /* kg/m3 */
+    double drag_center_fraction; /* 1 */
+    double steering_force;       /* N */
+    double thrust_min;           /* N */
+    double thrust_max;           /* N */
+};
+
+struct state {
+    double x, y;     /* m */
+    double heading;  /* rad, unwrapped */
+    double vx, vy;   /* m/s */
+    double yaw_rate; /* rad/s */
+};
+
+struct controls {
+    double thrust;          /* N */
+    double port, starboard; /* 1 */
+};
+
+/* The controls over a communication step: `start + t*rate`, then saturated. Without ramps they hold, and the bits are
+   those of the Python model, which knows none. */
+struct drive {
+    struct controls start;
+    struct controls rate; /* per s */
+    bool ramped;          /* some rate is not zero */
+};
+
+struct loads {
+    double x, y;   /* N */
+    double moment; /* N.m */
+    double kq;     /* kg/s: k*q, the drag per air speed */
+};
+
+enum integrator { SEMI_IMPLICIT_EULER = 1, DRAG_IMPLICIT, RK4, ADAPTIVE };
+
+struct settings {
+    double step_size; /* s */
+    int32_t integrator;
+    double tolerance; /* SI units */
+};
+
+struct stretch {
+    struct state state;
+    int64_t substeps;
+    double drag;     /* kg: the largest h*k*q seen */
+    double rotation; /* rad: the largest |yaw rate|*h seen */
+    double proposed; /* s: the step that the adaptive method would take next */
+    double substep;  /* s: the sub-step that was taken, or the one that is too small */
+};
+
+/* Why a stretch was not made; its `state` then tells what came out, where something did. */
+enum outcome { ADVANCED, TOO_MANY_SUBSTEPS, NOT_FINITE, STEP_TOO_SMALL };
+
+/* Python's max(a, b): the first, unless the second is beyond it; so NaN in b changes nothing. */
+static inline double larger(double a, double b)
+{
+    return b > a ? b : a;
+}
+
+double projected_area(const struct craft *craft);
+double drag_center(const struct craft *craft);
+double drag_factor(const struct craft *craft);
+
+struct controls saturate(const struct controls *controls, const struct craft *craft);
+struct controls controls_at(const struct drive *drive, double time);
+/* Side force [N] of both bow thrusters, after saturation. */
+double steering(const struct controls *controls, const struct craft *craft);
+struct loads loads_on(const struct state *state, const struct controls *controls, const struct craft *craft);
+/* Surge and sway [m/s]. */
+void body_velocity(const struct state *state, double *surge, double *sway);
+double stability_number(double drag, const struct craft *craft);
+
+/* The state one communication step [s], greater than 0, later. `proposed` [s] is what the last stretch of the adaptive
+   method returned, 0 at the start. */
+enum outcome advance(const struct state *state, const struct drive *drive, const struct craft *craft,
+                     double communication_step, const struct settings *settings, double proposed,
+                     struct stretch *stretch);
+
+#endif

@@ -1,0 +1,91 @@
+/* With HOVERCRAFT_NO_LIBC, for Windows: what a library needs that is linked to the kernel's functions alone, so that it
+   depends on no C runtime. */
+
+#include "memory.h"
+
+#ifndef HOVERCRAFT_NO_LIBC
+
+#include <stdlib.h>
+
+void *memory_allocate(size_t count, size_t size)
+{
+    return calloc(count, size);
+}
+
+void memory_release(void *memory)
+{
+    free(memory);
+}
+
+#else
+
+#include <string.h>
+
+__declspec(dllimport) void *__stdcall GetProcessHeap(void);
+__declspec(dllimport) void *__stdcall HeapAlloc(void *heap, unsigned long flags, size_t bytes);
+__declspec(dllimport) int __stdcall HeapFree(void *heap, unsigned long flags, void *memory);
+
+enum { HEAP_ZERO_MEMORY = 8 };
+int _fltused = 0; /* the linker asks for it where there are floats */
+
+int __stdcall DllMain(void *library, unsigned long reason, void *reserved);
+
+int __stdcall DllMain(void *library, unsigned long reason, void *reserved)
+{
+    (void)library, (void)reason, (void)reserved;
+    return 1;
+}
+
+void *memory_allocate(size_t count, size_t size)
+{
+    return HeapAlloc(GetProcessHeap(), HEAP_ZERO_MEMORY, count * size);
+}
+
+void memory_release(void *memory)
+{
+    if (memory)
+        HeapFree(GetProcessHeap(), 0, memory);
+}
+
+/* Or the compiler would make a call of memcpy of the loop in memcpy. */
+#define OWN __attribute__((no_builtin))
+
+OWN void *memcpy(void *restrict to, const void *restrict from, size_t size)
+{
+    for (size_t i = 0; i < size; i++)
+        ((unsigned char *)to)[i] = ((const unsigned char *)from)[i];
+    return to;
+}
+
+OWN void *memset(void *to, int value, size_t size)
+{
+    for (size_t i = 0; i < size; i++)
+        ((unsigned char *)to)[i] = (unsigned char)value;
+    return to;
+}
+
+OWN int memcmp(const void *a, const void *b, size_t size)
+{
+    const unsigned char *p = a, *q = b;
+    for (size_t i = 0; i < size; i++)
+        if (p[i] != q[i])
+            return p[i] < q[i] ? -1 : 1;
+    return 0;
+}
+
+OWN size_t strlen(const char *string)
+{
+    size_t n = 0;
+    while (string[n])
+        n++;
+    return n;
+}
+
+OWN int strcmp(const char *a, const char *b)
+{
+    while (*a && *a == *b)
+        a++, b++;
+    return (unsigned char)*a - (unsigned char)*b;
+}
+
+#endif

@@ -1,0 +1,167 @@
+/* A state as bytes, the same on every platform: little-endian words behind a head, a checksum behind them.
+
+     bytes 0-7     "HOVERFMU"
+     bytes 8-11    version of this layout
+     bytes 12-43   the build, hexadecimal
+     then          the content, in the order of `exchange`: doubles 8 bytes, integers 4
+     last 8        FNV-1a of all before: no change of a single byte escapes it */
+
+#include <string.h>
+
+#include "instance.h"
+
+enum { VERSION = 1, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
+static const char MAGIC[] = "HOVERFMU";
+
+enum direction { MEASURE, WRITE, READ };
+
+struct cursor {
+    enum direction direction;
+    unsigned char *to;         /* where to write */
+    const unsigned char *from; /* where to read */
+    size_t at;
+};
+
+static void exchange_word(struct cursor *cursor, uint64_t *word, unsigned size)
+{
+    uint64_t read = 0;
+    for (unsigned i = 0; i < size; i++) {
+        if (cursor->direction == WRITE)
+            cursor->to[cursor->at + i] = (unsigned char)(*word >> 8 * i);
+        else if (cursor->direction == READ)
+            read |= (uint64_t)cursor->from[cursor->at + i] << 8 * i;
+    }
+    if (cursor->direction == READ)
+        *word = read;
+    cursor->at += size;
+}
+
+static void exchange_double(struct cursor *cursor, double *value)
+{
+    uint64_t word;
+    memcpy(&word, value, sizeof word);
+    exchange_word(cursor, &word, 8);
+    memcpy(value, &word, sizeof word);
+}
+
+static void exchange_integer(struct cursor *cursor, int32_t *value)
+{
+    uint64_t word = (uint32_t)*value;
+    exchange_word(cursor, &word, 4);
+    const uint32_t low = (uint32_t)word;
+    memcpy(value, &low, sizeof low);
+}
+
+static void exchange_doubles(struct cursor *cursor, void *first, size_t bytes)
+{
+    for (size_t i = 0; i < bytes / sizeof(double); i++)
+        exchange_double(cursor, (double *)first + i);
+}
+
+/* All of the content that cannot be worked out from the rest; the same for writing and reading. */
+static void exchange(struct cursor *cursor, struct content *c)
+{
+    int32_t phase = (int32_t)c->phase, tuned = c->tuned;
+    for (unsigned i = 0; i < VARIABLE_COUNT; i++)
+        if (VARIABLES[i].kind != REAL)
+            exchange_integer(cursor, &c->integers[i]);
+    exchange_integer(cursor, &phase);
+    exchange_integer(cursor, &tuned);
+    exchange_integer(cursor, &c->settings.integrator);
+    exchange_double(cursor, &c->settings.step_size);
+    exchange_double(cursor, &c->settings.tolerance);
+    exchange_double(cursor, &c->time);
+    for (unsigned i = 0; i < VARIABLE_COUNT; i++)
+        if (VARIABLES[i].start_given && VARIABLES[i].kind == REAL)
+            exchange_double(cursor, &c->reals[i]);
+    exchange_doubles(cursor, c->rates, sizeof c->rates);
+    exchange_double(cursor, &c->hosts_tolerance);
+    exchange_doubles(cursor, &c->state, sizeof c->state);
+    exchange_doubles(cursor, &c->controls, sizeof c->controls);
+    exchange_doubles(cursor, &c->craft, sizeof c->craft);
+    exchange_double(cursor, &c->proposed);
+    exchange_double(cursor, &c->drag);
+    exchange_double(cursor, &c->rotation);
+    c->phase = phase >= 0 && phase < PHASE_COUNT ? (enum phase)phase : PHASE_COUNT;
+    c->tuned = tuned != 0;
+}
+
+size_t serialized_size(void)
+{
+    struct content content = {.phase = INSTANTIATED};
+    struct cursor cursor = {MEASURE, NULL, NULL, HEAD_SIZE};
+    exchange(&cursor, &content);
+    return cursor.at + SUM_SIZE;
+}
+
+static uint64_t checksum(const unsigned char *bytes, size_t n)
+{
+    uint64_t sum = UINT64_C(0xcbf29ce484222325);
+    for (size_t i = 0; i < n; i++)
+        sum = (sum ^ bytes[i]) * UINT64_C(0x100000001b3);
+    return sum;
+}
+
+void content_serialize(const struct content *content, unsigned char *bytes)
+{
+    struct content copy = *content;
+    struct cursor cursor = {WRITE, bytes, NULL, MAGIC_SIZE};
+    int32_t version = VERSION;
+    memcpy(bytes, MAGIC, MAGIC_SIZE);
+    exchange_integer(&cursor, &version);
+    memcpy(bytes + cursor.at, BUILD, BUILD_SIZE);
+    cursor.at = HEAD_SIZE;
+    exchange(&cursor, &copy);
+    uint64_t sum = checksum(bytes, cursor.at);
+    exchange_word(&cursor, &sum, SUM_SIZE);
+}
+
+static bool is_complete(const unsigned char *bytes, size_t size)
+{
+    struct cursor cursor = {READ, NULL, bytes, size - SUM_SIZE};
+    uint64_t sum;
+    if (size < HEAD_SIZE + SUM_SIZE || memcmp(bytes, MAGIC, MAGIC_SIZE) != 0)
+        return false;
+    exchange_word(&cursor, &sum, SUM_SIZE);
+    return sum == checksum(bytes, size - SUM_SIZE);
+}
+
+static bool is_of_this_build(const unsigned char *bytes, size_t size)
+{
+    struct cursor cursor = {READ, NULL, bytes, MAGIC_SIZE};
+    int32_t version = 0;
+    exchange_integer(&cursor, &version);
+    return version == VERSION && size == serialized_size() && memcmp(bytes + cursor.at, BUILD, BUILD_SIZE) == 0;
+}
+
+/* The words are right; whoever can work out a checksum may still have written anything. */
+static bool is_possible(const struct content *c)
+{
+    const int32_t most = (int32_t)(sizeof METHODS / sizeof *METHODS);
+    const bool started = c->phase == STEPPING || c->phase == TERMINATED;
+    const int32_t kept = c->integers[V_INTEGRATOR], used = c->settings.integrator;
+    return c->phase < PHASE_COUNT && kept >= 1 && kept <= most && (!started || (used >= 1 && used <= most)) &&
+           c->integers[V_SUBSTEPS] >= 0;
+}
+
+enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
+                                  struct content *content)
+{
+    struct cursor cursor = {READ, NULL, bytes, HEAD_SIZE};
+    char build[BUILD_SIZE + 1] = "";
+    if (!is_complete(bytes, size))
+        return instance_say(instance, REFUSED, "serialized FMU state of %u bytes: must be complete and unchanged",
+                            (unsigned long long)size);
+    memcpy(build, bytes + MAGIC_SIZE + 4, BUILD_SIZE);
+    if (!is_of_this_build(bytes, size))
+        return instance_say(instance, REFUSED, "FMU state of build %q: must be a state of this build, %s", build,
+                            BUILD);
+    *content = instance->now; /* what is not among the bytes is worked out again */
+    exchange(&cursor, content);
+    content->reals[V_PROJECTED_AREA] = projected_area(&content->craft);
+    content->moved = content->acted = true;
+    if (!is_possible(content))
+        return instance_say(instance, REFUSED, "serialized FMU state of %u bytes: must be one that this FMU wrote",
+                            (unsigned long long)size);
+    return FINE;
+}

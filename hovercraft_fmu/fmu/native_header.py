@@ -1,0 +1,181 @@
+"""variables.h: the table of variables, and what else C and Python must share, for the C compiler."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import fields
+
+from ..model.craft import NOT_NEGATIVE, POSITIVE, Craft
+from ..model.integrators import INTEGRATORS
+from .description import guid
+from .interface import (
+    ACTION,
+    COUNTER_STOPPED,
+    CRAFT_PARAMETERS,
+    INPUT_HELD,
+    INPUTS,
+    MOTION,
+    STATES,
+    STEP_TURNS,
+    STEP_UNSTABLE,
+    SUBSTEPS_MAX,
+    VARIABLES,
+    WARNINGS,
+    WATCHED,
+    Variable,
+)
+from .slave import HELD, SAME_TIME, SETTABLE, Phase
+
+HEADER = """\
+/* Made from hovercraft_fmu/fmu/interface.py. */
+
+#ifndef HOVERCRAFT_VARIABLES_H
+#define HOVERCRAFT_VARIABLES_H
+
+#include <math.h>
+#include <stddef.h>
+
+#include "kernel.h"
+
+#define BUILD "{build}"
+#define GUID "{guid}"
+
+/* Value references; `reals` and `integers` of an instance are indexed by them. */
+enum {{
+{references}
+    VARIABLE_COUNT
+}};
+
+enum {{ {counts} }};
+enum {{ SUBSTEPS_MAX = {substeps_max} }};
+enum {{ {warnings} }};
+#define COUNTER_STOPPED_TEXT {counter_text}
+#define INTEGRATOR_LIST {integrator_list}
+#define HELD {held}
+#define SAME_TIME {same_time}
+
+enum kind {{ REAL, INTEGER, ENUMERATION }};
+enum phase {{ {phases}, PHASE_COUNT }};
+enum rule {{ {rules} }};
+
+struct variable {{
+    const char *name;
+    const char *role;       /* variability and causality, for messages */
+    enum kind kind;
+    enum rule rule;         /* of its value, beyond being finite */
+    unsigned settable;      /* bit n: in phase n */
+    bool start_given;       /* it is kept as the host set it */
+    double start;
+}};
+
+struct method {{
+    const char *name;
+    double stability_limit; /* 1 */
+    double rotation_limit;  /* rad */
+}};
+
+struct craft_field {{
+    unsigned reference;
+    size_t offset;          /* in struct craft */
+}};
+
+static const char *const PHASE_NAMES[] = {{{phase_names}}};
+static const struct variable VARIABLES[] = {{
+{variables}
+}};
+static const struct method METHODS[] = {{
+{methods}
+}};
+static const struct craft_field CRAFT_FIELDS[] = {{
+{craft_fields}
+}};
+static const unsigned INPUTS[] = {{{inputs}}};
+static const unsigned STATES[] = {{{states}}};
+static const unsigned MOTION[] = {{{motion}}};
+static const unsigned ACTION[] = {{{action}}};
+static const unsigned WATCHED[] = {{{watched}}};
+
+#endif
+"""
+OF_A_KIND = {"step_size": "STEP_SIZE_RULE", "tolerance": "TOLERANCE_RULE", "integrator": "INTEGRATOR_RULE"}
+RULES = ("ANY", "POSITIVE", "NOT_NEGATIVE", "FRACTION", *OF_A_KIND.values())
+
+
+def variables_header(build: str) -> str:
+    """The text of variables.h for the FMU whose content has the hexadecimal digest `build`."""
+    warnings = {
+        "INPUT_HELD": INPUT_HELD,
+        "COUNTER_STOPPED": COUNTER_STOPPED,
+        "STEP_UNSTABLE": STEP_UNSTABLE,
+        "STEP_TURNS": STEP_TURNS,
+    }
+    counts = {"INPUT_COUNT": len(INPUTS), "STATE_COUNT": len(STATES), "CRAFT_COUNT": len(CRAFT_PARAMETERS)}
+    known = ", ".join(f"{i} ({method.name})" for i, method in enumerate(INTEGRATORS, 1))
+    return HEADER.format(
+        build=build,
+        guid=guid(build),
+        references="\n".join(f"    {constant(v.name)} = {v.reference}," for v in VARIABLES),
+        counts=_assigned(counts),
+        substeps_max=SUBSTEPS_MAX,
+        warnings=_assigned(warnings),
+        counter_text=_quoted(WARNINGS[COUNTER_STOPPED]),
+        integrator_list=_quoted(known),
+        held=repr(HELD),
+        same_time=repr(SAME_TIME),
+        phases=", ".join(phase.name for phase in Phase),
+        rules=", ".join(RULES),
+        phase_names=", ".join(_quoted(phase.value) for phase in Phase),
+        variables="\n".join(f"    [{constant(v.name)}] = {_row(v)}," for v in VARIABLES),
+        methods="\n".join(
+            f"    {{{_quoted(m.name)}, {_number(m.stability_limit)}, {_number(m.rotation_limit)}}},"
+            for m in INTEGRATORS
+        ),
+        craft_fields="\n".join(
+            f"    {{{constant(field.name)}, offsetof(struct craft, {field.name})}}," for field in fields(Craft)
+        ),
+        inputs=_constants(INPUTS),
+        states=_constants(STATES),
+        motion=_constants(MOTION),
+        action=_constants(ACTION),
+        watched=_constants(WATCHED),
+    )
+
+
+def constant(name: str) -> str:
+    """The C name of a variable's value reference."""
+    return "V_" + name.upper().replace(".", "_")
+
+
+def _constants(names: Iterable[str]) -> str:
+    return ", ".join(constant(name) for name in names)
+
+
+def _row(variable: Variable) -> str:
+    phases = sum(1 << i for i, phase in enumerate(Phase) if variable.reference in SETTABLE[phase])
+    role = _quoted(f"{variable.variability} {variable.causality}")
+    given = "true" if variable.start is not None else "false"
+    start = _number(float(variable.start or 0.0))
+    kind = variable.kind.upper()
+    return f"{{{_quoted(variable.name)}, {role}, {kind}, {_rule(variable.name)}, {phases}u, {given}, {start}}}"
+
+
+def _rule(name: str) -> str:
+    """As check_parameter and the slave's _check_set have it."""
+    if name in POSITIVE:
+        return "POSITIVE"
+    if name in NOT_NEGATIVE:
+        return "NOT_NEGATIVE"
+    if name == "drag_center_fraction":
+        return "FRACTION"
+    return OF_A_KIND.get(name, "ANY")
+
+
+def _assigned(values: dict[str, int]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in values.items())
+
+
+def _quoted(text: str) -> str:
+    return f'"{text}"'
+
+
+def _number(value: float) -> str:
+    return "INFINITY" if value == math.inf else repr(value)

@@ -1,0 +1,143 @@
+"""The C of the native FMU as this machine's compiler builds it, through ctypes."""
+
+import subprocess
+from collections.abc import Iterable, Sequence
+from ctypes import CDLL, POINTER, Structure, byref, c_bool, c_char_p, c_double, c_int32, c_int64, create_string_buffer
+from dataclasses import astuple, fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hovercraft_fmu.fmu.native_package import C_FOLDER, OPTIONS, sources
+from hovercraft_fmu.hosts import compiler
+from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.dynamics import Controls, State
+from hovercraft_fmu.model.integrators import INTEGRATORS, Stretch
+from hovercraft_fmu.model.subcycling import Settings
+
+C_TESTS = Path(__file__).parent / "c"
+OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
+NO_RAMP = Controls(0.0, 0.0, 0.0)
+
+
+def c_compiler() -> str:
+    """The C compiler of this machine, or the test is skipped."""
+    name = compiler()
+    if name is None:
+        pytest.skip("no C compiler (cc, gcc, clang)")
+    return name
+
+
+def written_sources(folder: Path) -> Path:
+    """The sources of the native FMU, generated header and all, in `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in sources("0" * 32).items():
+        (folder / name).write_bytes(content)
+    return folder
+
+
+def compile_c(output: Path, files: Iterable[Path | str], *options: str) -> Path:
+    """Compile with this machine's compiler and the options of the FMU, warnings as errors."""
+    command = [c_compiler(), *OPTIONS, "-Wall", "-Wextra", "-Werror", "-I", str(C_FOLDER), "-o", str(output)]
+    done = subprocess.run([*command, *map(str, files), *options], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return output
+
+
+class CCraft(Structure):
+    _fields_ = [(field.name, c_double) for field in fields(Craft)]
+
+
+class CState(Structure):
+    _fields_ = [(name, c_double) for name in State._fields]
+
+
+class CControls(Structure):
+    _fields_ = [(name, c_double) for name in Controls._fields]
+
+
+class CDrive(Structure):
+    _fields_ = [("start", CControls), ("rate", CControls), ("ramped", c_bool)]
+
+
+class CSettings(Structure):
+    _fields_ = [("step_size", c_double), ("integrator", c_int32), ("tolerance", c_double)]
+
+
+class CStretch(Structure):
+    _fields_ = [
+        ("state", CState),
+        ("substeps", c_int64),
+        ("drag", c_double),
+        ("rotation", c_double),
+        ("proposed", c_double),
+        ("substep", c_double),
+    ]
+
+
+class CLoads(Structure):
+    _fields_ = [(name, c_double) for name in ("x", "y", "moment", "kq")]
+
+
+def numbers_of(structure: Structure, names: Sequence[str]) -> tuple[float, ...]:
+    return tuple(getattr(structure, name) for name in names)
+
+
+class Kernel:
+    """kernel.c in a shared library."""
+
+    def __init__(self, library: Path) -> None:
+        self.library: Any = CDLL(str(library))
+        self.library.loads_on.restype = CLoads
+        self.library.stability_number.restype = c_double
+        self.library.stability_number.argtypes = (c_double, POINTER(CCraft))
+
+    def advance(
+        self,
+        state: State,
+        controls: Controls,
+        craft: Craft,
+        communication_step: float,
+        settings: Settings = Settings(),  # noqa: B008 - immutable
+        proposed: float = 0.0,
+        rate: Controls = NO_RAMP,
+    ) -> tuple[str, Stretch]:
+        """What came of it (see OUTCOMES), and the stretch."""
+        drive = CDrive(CControls(*controls), CControls(*rate), any(rate))
+        number = INTEGRATORS.index(settings.integrator) + 1
+        chosen = CSettings(settings.step_size, number, settings.tolerance)
+        made = CStretch()
+        outcome = self.library.advance(
+            byref(CState(*state)), byref(drive), byref(CCraft(*astuple(craft))), c_double(communication_step),
+            byref(chosen), c_double(proposed), byref(made),
+        )  # fmt: skip
+        reached = State(*numbers_of(made.state, State._fields))
+        return OUTCOMES[outcome], Stretch(reached, made.substeps, made.drag, made.rotation, made.proposed)
+
+    def loads(self, state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
+        arguments = byref(CState(*state)), byref(CControls(*controls)), byref(CCraft(*astuple(craft)))
+        return numbers_of(self.library.loads_on(*arguments), ("x", "y", "moment", "kq"))
+
+    def stability_number(self, drag: float, craft: Craft) -> float:
+        return float(self.library.stability_number(drag, byref(CCraft(*astuple(craft)))))
+
+
+class Text:
+    """text.c in a shared library."""
+
+    def __init__(self, library: Path) -> None:
+        self.library: Any = CDLL(str(library))
+        self.buffer = create_string_buffer(640)
+
+    def real(self, form: str, value: float) -> str:
+        self.library.text_of_real(self.buffer, c_char_p(form.encode()), c_double(value))
+        return self.buffer.value.decode()
+
+    def integer(self, form: str, value: int) -> str:
+        self.library.text_of_integer(self.buffer, c_char_p(form.encode()), c_int64(value))
+        return self.buffer.value.decode()
+
+    def string(self, form: str, value: str) -> str:
+        self.library.text_of_string(self.buffer, c_char_p(form.encode()), c_char_p(value.encode()))
+        return self.buffer.value.decode()

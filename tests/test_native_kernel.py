@@ -1,0 +1,280 @@
+"""The C kernel against the Python model: equal with this platform's libm, close with the sine and cosine that ship."""
+
+import math
+import random
+from ctypes import byref, c_double
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hovercraft_fmu.fmu.native_package import C_FOLDER
+from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.dynamics import Controls, State, drag_per_speed, loads, saturate
+from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, Stretch
+from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, stability_number
+from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.simulation import plan, schedule
+from tests.native import C_TESTS, Kernel, Text, compile_c
+from tests.strategies import calm_crafts, controls, crafts, numbers, states
+
+KERNEL, TRIG = C_FOLDER / "kernel.c", C_FOLDER / "trig.c"
+SHARED = ("-shared", "-fPIC", "-lm")
+STEPS = {"semi_implicit_euler": 0.001, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
+METHODS = {method.name: method for method in INTEGRATORS}
+
+
+@pytest.fixture(scope="module")
+def libm(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
+    """With this platform's sine and cosine, which are Python's."""
+    folder = tmp_path_factory.mktemp("libm")
+    return Kernel(compile_c(folder / "kernel.so", [KERNEL], "-DHOVERCRAFT_LIBM", *SHARED))
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
+    """With those of the FMU."""
+    return Kernel(compile_c(tmp_path_factory.mktemp("shipped") / "kernel.so", [KERNEL, TRIG], *SHARED))
+
+
+@pytest.fixture(scope="module")
+def text(tmp_path_factory: pytest.TempPathFactory) -> Text:
+    files = [C_FOLDER / "text.c", C_TESTS / "text_of.c"]
+    return Text(compile_c(tmp_path_factory.mktemp("text") / "text.so", files, "-shared", "-fPIC"))
+
+
+def _of_python(
+    state: State, held: Controls, craft: Craft, step: float, how: Settings, proposed: float = 0.0
+) -> tuple[str, Stretch | None]:
+    try:
+        return "advanced", advance(state, held, craft, step, how, proposed=proposed)
+    except NonFiniteError:
+        return "not finite", None
+    except StepTooSmallError:
+        return "step too small", None
+    except ValueError:
+        return "too many sub-steps", None
+
+
+def _assert_close(found: Stretch, expected: Stretch) -> None:
+    assert found.substeps == expected.substeps
+    for value, wanted in zip(found.state, expected.state, strict=True):
+        assert abs(value - wanted) <= 1e-12 * max(1.0, abs(wanted))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", SCENES)
+def test_every_scene_and_method(name: str, method: str, libm: Kernel, shipped: Kernel) -> None:
+    """Every communication step of a run is equal, and with the shipped sine and cosine its end is close.
+
+    drag_implicit turns the velocity into the body frame and back in every sub-step: c*c + s*s is 1 to rounding only,
+    and on a straight course that rounding is the same every time. So its bits part in proportion to the sub-steps.
+    """
+    run = plan(name, start_values={"integrator": method, "step_size": STEPS[method]})
+    craft, how = run.craft, run.settings
+    state = python = run.start
+    proposed = python_proposed = other = 0.0
+    near, count = run.start, 0
+    for time, end, held in schedule(run):
+        expected = advance(python, held, craft, end - time, how, proposed=python_proposed)
+        outcome, made = libm.advance(state, held, craft, end - time, how, proposed)
+        assert (outcome, made) == ("advanced", expected)
+        python, python_proposed = expected.state, expected.proposed
+        state, proposed = made.state, made.proposed
+        outcome, made = shipped.advance(near, held, craft, end - time, how, other)
+        near, other, count = made.state, made.proposed, count + made.substeps
+    parted = max(1e-12, 2e-15 * count) if method == "drag_implicit" else 1e-12
+    for value, wanted in zip(near, python, strict=True):
+        assert abs(value - wanted) <= parted * max(1.0, abs(wanted))
+
+
+@settings(max_examples=600)
+@given(
+    craft=crafts,
+    state=states,
+    held=controls,
+    method=st.sampled_from(INTEGRATORS),
+    step=st.one_of(numbers(1e-6, 0.2), st.sampled_from([0.01, 0.009999999999999787, 0.1, 1.0, 1e-13])),
+    step_size=st.sampled_from([0.001, 0.01, 0.1, 0.0005, 0.3]),
+    tolerance=st.sampled_from([1e-3, 1e-6, 1e-9]),
+    proposed=st.sampled_from([0.0, 0.004, 10.0]),
+)
+def test_random_craft_states_controls_and_steps(
+    craft: Craft,
+    state: State,
+    held: Controls,
+    method: object,
+    step: float,
+    step_size: float,
+    tolerance: float,
+    proposed: float,
+    libm: Kernel,
+) -> None:
+    how = Settings(step_size, method, tolerance)  # type: ignore[arg-type]
+    outcome, expected = _of_python(state, held, craft, step, how, proposed=proposed)
+    found, made = libm.advance(state, held, craft, step, how, proposed)
+    assert found == outcome
+    assert expected is None or made == expected
+
+
+@settings(max_examples=300)
+@given(craft=calm_crafts, state=states, held=controls, method=st.sampled_from(INTEGRATORS), step=numbers(1e-4, 0.1))
+def test_shipped_sine_and_cosine_are_close(
+    craft: Craft, state: State, held: Controls, method: object, step: float, shipped: Kernel
+) -> None:
+    """Of the bits, a few of the last differ: on stable runs that stays so."""
+    how = Settings(0.001, method, 1e-3)  # type: ignore[arg-type]
+    outcome, made = shipped.advance(state, held, craft, step, how)
+    assert outcome == "advanced"
+    _assert_close(made, advance(state, held, craft, step, how))
+
+
+@given(craft=crafts, state=states, held=controls)
+def test_loads_and_the_stability_number(craft: Craft, state: State, held: Controls, libm: Kernel) -> None:
+    expected = (*loads(state, held, craft), drag_per_speed(state, craft))
+    assert libm.loads(state, held, craft) == expected
+    assert libm.stability_number(expected[-1], craft) == stability_number(expected[-1], craft)
+
+
+EXTREMES = {
+    "overflow of the drag": (State(vx=1e150), Craft(), 0.1),
+    "overflow of the position": (State(x=1.7e308, vx=1.7e308), Craft(drag_coefficient=0.0), 1.0),
+    "overflow of the heading": (State(heading=1.7e308, yaw_rate=1.7e308), Craft(drag_coefficient=0.0), 1.0),
+    "density without end": (State(vx=1.0), Craft(air_density=1e300, drag_coefficient=1e300), 0.1),
+    "too many sub-steps": (State(), Craft(), 1e7),
+    "a huge heading": (State(heading=-1e200, vx=1.0, yaw_rate=1.0), Craft(), 0.1),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", EXTREMES)
+def test_extremes_end_in_the_same_way(name: str, method: str, libm: Kernel) -> None:
+    if name == "too many sub-steps" and method == "adaptive":
+        return  # it has no limit, and no sub-steps that would be cut
+    state, craft, step = EXTREMES[name]
+    how = Settings(0.001, METHODS[method])
+    outcome, expected = _of_python(state, Controls(), craft, step, how)
+    found, made = libm.advance(state, Controls(), craft, step, how)
+    assert found == outcome
+    assert expected is None or made == expected
+
+
+# ---- ramps, which the Python model does not have
+
+
+RAMP, START = Controls(1.5, 0.2, -0.1), Controls(9.0, 0.1, 0.6)
+
+
+@pytest.mark.parametrize("method", ["semi_implicit_euler", "drag_implicit"])
+def test_first_order_methods_take_a_ramp_at_the_start_of_each_substep(method: str, libm: Kernel) -> None:
+    """As if the controls were set anew, and held, sub-step by sub-step; thrust meets its limit on the way."""
+    how = Settings(0.001, METHODS[method])
+    state = State(vx=0.3, yaw_rate=0.05)
+    outcome, made = libm.advance(state, START, Craft(), 2.0, how, rate=RAMP)
+    assert outcome == "advanced"
+    for i in range(2000):
+        t = i * 0.001
+        held = Controls(*(start + t * rate for start, rate in zip(START, RAMP, strict=True)))
+        state = advance(state, held, Craft(), 0.001, how).state
+    assert made.state == state
+
+
+@pytest.mark.parametrize("method", ["rk4", "adaptive"])
+def test_higher_methods_are_exact_on_a_ramp_of_thrust(method: str, libm: Kernel) -> None:
+    """Without drag the velocity is the integral of the ramp, (T t + a t^2/2)/m, the position a cubic."""
+    craft = Craft(drag_coefficient=0.0)
+    how = Settings(0.5, METHODS[method])
+    outcome, made = libm.advance(State(), Controls(1.0, 0.0, 0.0), craft, 4.0, how, rate=Controls(2.0, 0.0, 0.0))
+    assert outcome == "advanced"
+    assert made.state.vx == pytest.approx((1.0 * 4.0 + 2.0 * 8.0) / 100.0, rel=1e-14)
+    assert made.state.x == pytest.approx((0.5 * 16.0 + 2.0 * 64.0 / 6.0) / 100.0, rel=1e-14)
+
+
+def test_rk4_keeps_its_order_on_ramps(libm: Kernel) -> None:
+    """The slope of the error against the step; the ramps stay inside their limits."""
+    rates, held = Controls(1.0, 0.2, -0.1), Controls(2.0, 0.1, 0.5)
+    start = State(vx=0.3, vy=-0.1, yaw_rate=0.1)
+
+    def end(h: float) -> np.ndarray:
+        outcome, made = libm.advance(start, held, Craft(), 4.0, Settings(h, METHODS["rk4"]), rate=rates)
+        assert outcome == "advanced"
+        return np.array(made.state)
+
+    best = end(0.001)
+    errors = [np.abs(end(h) - best).max() for h in (0.02, 0.01)]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_ramp_saturates_and_stays_there(method: str, libm: Kernel) -> None:
+    """Thrust meets its limit after 1 s; after that all is as with the limit held."""
+    craft = Craft(drag_coefficient=0.0)
+    how = Settings(0.001, METHODS[method], 1e-9)
+    outcome, made = libm.advance(State(), Controls(8.0, 0.0, 0.0), craft, 5.0, how, rate=Controls(2.0, 0.0, 0.0))
+    assert outcome == "advanced"
+    assert made.state.vx == pytest.approx((8.0 + 1.0 + 4 * 10.0) / 100.0, abs=2e-5)
+    assert saturate(Controls(18.0, 0.0, 0.0), craft).thrust == 10.0
+
+
+# ---- sine and cosine
+
+
+def _sine_cosine(kernel: Kernel, angle: float) -> tuple[float, float]:
+    sine, cosine = c_double(), c_double()
+    kernel.library.trig_sine_cosine(c_double(angle), byref(sine), byref(cosine))
+    return sine.value, cosine.value
+
+
+def test_sine_and_cosine_of_any_angle(shipped: Kernel) -> None:
+    """Within one unit in the last place of 1 of libm's: small, a few turns, millions of radians, any size."""
+    dice = random.Random(1)
+    angles = [k * math.pi / 4 + shift for k in range(-400, 400) for shift in (0.0, 1e-9, -1e-9)]
+    angles += [dice.uniform(-1.0, 1.0) * 10.0**power for power in range(-320, 309) for _ in range(50)]
+    angles += [2.0**power for power in range(-1074, 1024)] + [k * math.pi / 2 for k in range(1 << 20, (1 << 20) + 99)]
+    for angle in angles:
+        sine, cosine = _sine_cosine(shipped, angle)
+        assert abs(sine - math.sin(angle)) <= 2.3e-16 * min(1.0, 2.0 * abs(math.sin(angle)) + 1e-300), angle
+        assert abs(cosine - math.cos(angle)) <= 2.3e-16 * min(1.0, 2.0 * abs(math.cos(angle)) + 1e-300), angle
+
+
+def test_the_hardest_angle(shipped: Kernel) -> None:
+    """The double nearest to a multiple of pi/2 (Muller, Elementary Functions, table of worst cases)."""
+    assert _sine_cosine(shipped, 6381956970095103.0 * 2.0**797) == (1.0, -4.6871659242546276e-19)
+
+
+def test_sine_and_cosine_at_the_ends(shipped: Kernel) -> None:
+    sine, cosine = _sine_cosine(shipped, -0.0)
+    assert (math.copysign(1.0, sine), sine, cosine) == (-1.0, 0.0, 1.0)
+    for angle in (math.inf, -math.inf, math.nan):
+        assert all(math.isnan(value) for value in _sine_cosine(shipped, angle))
+
+
+@given(angle=st.floats(allow_nan=False, allow_infinity=False))
+def test_sine_is_odd_and_cosine_even(angle: float, shipped: Kernel) -> None:
+    sine, cosine = _sine_cosine(shipped, angle)
+    assert _sine_cosine(shipped, -angle) == (-sine, cosine)
+
+
+# ---- numbers in messages
+
+
+@settings(max_examples=2000)
+@given(value=st.floats())
+def test_numbers_read_as_in_python(value: float, text: Text) -> None:
+    assert text.real("%r", value) == repr(value)
+    assert text.real("%4", value) == f"{value:.4g}"
+    assert text.real("%3", value) == f"{value:.3g}"
+
+
+def test_numbers_where_digits_and_powers_meet(text: Text) -> None:
+    values = [2.0**power for power in range(-1074, 1024)] + [float(f"1e{power}") for power in range(-323, 309)]
+    for value in [*values, 99995.0, 9999.5, 99950.0, 0.00099995, 1e16, 9999999999999998.0, 5e-324, 1.0, 0.1]:
+        assert [text.real(form, value) for form in ("%r", "%4", "%3")] == [repr(value), f"{value:.4g}", f"{value:.3g}"]
+
+
+def test_integers_and_strings(text: Text) -> None:
+    for value in (0, -1, 2**63 - 1, -(2**63)):
+        assert text.integer("%i", value) == str(value)
+    assert text.string("'%q'", "a%s#b\n\u00e9") == "'a?s?b???'"
+    assert text.string("%s", "x" * 2000) == "x" * 639
