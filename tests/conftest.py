@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 from hovercraft_fmu import build_fmu
+from hovercraft_fmu.fmu.native_package import build_native_fmu, has_compiler
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -23,6 +24,27 @@ Fresh: TypeAlias = Callable[..., str]
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The FMU of this tree."""
     return build_fmu(tmp_path_factory.mktemp("fmu") / "Hovercraft.fmu")
+
+
+@pytest.fixture(scope="session")
+def native_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The native FMU of this tree."""
+    if not has_compiler():
+        pytest.skip("no ziglang: pip install 'hovercraft-fmu[native]'")
+    return build_native_fmu(tmp_path_factory.mktemp("native") / "HovercraftNative.fmu")
+
+
+@pytest.fixture(scope="session", params=["python", "native"])
+def flavour(request: pytest.FixtureRequest) -> str:
+    """Both kinds of FMU, one after the other."""
+    return str(request.param)
+
+
+@pytest.fixture(scope="session")
+def each_fmu(flavour: str, request: pytest.FixtureRequest) -> Path:
+    """The FMU of that kind."""
+    made: Path = request.getfixturevalue("native_fmu" if flavour == "native" else "fmu")
+    return made
 
 
 @pytest.fixture
