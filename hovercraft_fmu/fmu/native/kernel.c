@@ -148,52 +148,44 @@ void body_velocity(const struct state *state, double *surge, double *sway)
 
 /* What is watched over a stretch. */
 struct watch {
-    double most;    /* kg/s: k*q */
-    double fastest; /* rad/s */
+    double most;        /* kg/s: the largest k*q */
+    double left, right; /* rad/s: the least and the largest yaw rate */
 };
 
-static inline void look(struct watch *watch, double kq, double yaw_rate)
+static inline void watch_loads(struct watch *watch, double kq)
 {
-    if (kq > watch->most)
-        watch->most = kq;
-    if (!(-watch->fastest <= yaw_rate && yaw_rate <= watch->fastest))
-        watch->fastest = fabs(yaw_rate);
+    watch->most = larger(watch->most, kq);
 }
 
-/* n sub-steps in about six blocks, of which `done` are over: the size of the next. */
-static int64_t next_block(int64_t n, int64_t done)
+static inline void watch_yaw_rate(struct watch *watch, double yaw_rate)
 {
-    const int64_t size = n / 5 | 1, left = n - done;
-    if (done == 0)
-        return n < 1 ? n : 1;
-    return left < size ? left : size;
+    watch->left = smaller(watch->left, yaw_rate);
+    watch->right = larger(watch->right, yaw_rate);
 }
 
 static struct stretch stretch_of(const struct load_function *f, const struct state *s, int64_t n, double h,
                                  const struct watch *watch)
 {
     const double most = larger(watch->most, loads_at(f, s->heading, s->vx, s->vy, s->yaw_rate).kq);
-    return (struct stretch){*s, n, h * most, h * watch->fastest, 0.0, h};
+    return (struct stretch){*s, n, h * most, h * larger(watch->right, -watch->left), 0.0, h};
 }
 
 static struct stretch semi_implicit_euler(const struct state *state, struct load_function *f, double h, int64_t n)
 {
     const double mass = f->craft->mass, inertia = f->craft->inertia;
     struct state s = *state;
-    struct watch watch = {0.0, fabs(s.yaw_rate)};
-    for (int64_t i = 0, block; i < n;) {
-        struct loads loads = {0};
-        for (block = next_block(n, i); block > 0; block--, i++) {
-            steer_at(f, (double)i * h);
-            loads = loads_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
-            s.vx = s.vx + h * (loads.x / mass);
-            s.vy = s.vy + h * (loads.y / mass);
-            s.x = s.x + h * s.vx;
-            s.y = s.y + h * s.vy;
-            s.yaw_rate = s.yaw_rate + h * (loads.moment / inertia);
-            s.heading = s.heading + h * s.yaw_rate;
-        }
-        look(&watch, loads.kq, s.yaw_rate);
+    struct watch watch = {0.0, s.yaw_rate, s.yaw_rate};
+    for (int64_t i = 0; i < n; i++) {
+        steer_at(f, (double)i * h);
+        const struct loads loads = loads_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
+        s.vx = s.vx + h * (loads.x / mass);
+        s.vy = s.vy + h * (loads.y / mass);
+        s.x = s.x + h * s.vx;
+        s.y = s.y + h * s.vy;
+        s.yaw_rate = s.yaw_rate + h * (loads.moment / inertia);
+        s.heading = s.heading + h * s.yaw_rate;
+        watch_loads(&watch, loads.kq);
+        watch_yaw_rate(&watch, s.yaw_rate);
     }
     return stretch_of(f, &s, n, h, &watch);
 }
@@ -212,29 +204,27 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
     const double mass = f->craft->mass, inertia = f->craft->inertia, x_d = f->x_d;
     const double spread = inertia + mass * x_d * x_d;
     struct state z = *state;
-    struct watch watch = {0.0, fabs(z.yaw_rate)};
-    for (int64_t i = 0, block; i < n;) {
-        double kq = 0.0;
-        for (block = next_block(n, i); block > 0; block--, i++) {
-            double c, s;
-            steer_at(f, (double)i * h);
-            sine_cosine(z.heading, &s, &c);
-            kq = drag_per_speed(f, c, s, z.vx, z.vy, z.yaw_rate);
-            const double g = h * kq;
-            const double surge = (mass * (c * z.vx + s * z.vy) + h * f->thrust) / (mass + g);
-            const double a = mass * (c * z.vy - s * z.vx) + h * f->side;
-            const double b = inertia * z.yaw_rate + h * f->turn;
-            const double e = x_d * a - b;
-            const double determinant = mass * inertia + g * spread;
-            const double sway = (inertia * a + g * x_d * e) / determinant;
-            z.yaw_rate = (mass * b - g * e) / determinant;
-            z.vx = c * surge - s * sway;
-            z.vy = s * surge + c * sway;
-            z.x = z.x + h * z.vx;
-            z.y = z.y + h * z.vy;
-            z.heading = z.heading + h * z.yaw_rate;
-        }
-        look(&watch, kq, z.yaw_rate);
+    struct watch watch = {0.0, z.yaw_rate, z.yaw_rate};
+    for (int64_t i = 0; i < n; i++) {
+        double c, s;
+        steer_at(f, (double)i * h);
+        sine_cosine(z.heading, &s, &c);
+        const double kq = drag_per_speed(f, c, s, z.vx, z.vy, z.yaw_rate);
+        const double g = h * kq;
+        const double surge = (mass * (c * z.vx + s * z.vy) + h * f->thrust) / (mass + g);
+        const double a = mass * (c * z.vy - s * z.vx) + h * f->side;
+        const double b = inertia * z.yaw_rate + h * f->turn;
+        const double e = x_d * a - b;
+        const double determinant = mass * inertia + g * spread;
+        const double sway = (inertia * a + g * x_d * e) / determinant;
+        z.yaw_rate = (mass * b - g * e) / determinant;
+        z.vx = c * surge - s * sway;
+        z.vy = s * surge + c * sway;
+        z.x = z.x + h * z.vx;
+        z.y = z.y + h * z.vy;
+        z.heading = z.heading + h * z.yaw_rate;
+        watch_loads(&watch, kq);
+        watch_yaw_rate(&watch, z.yaw_rate);
     }
     return stretch_of(f, &z, n, h, &watch);
 }
@@ -252,32 +242,35 @@ static struct stretch rk4(const struct state *state, struct load_function *f, do
 {
     const double half = 0.5 * h, sixth = h / 6.0, square = h * h / 6.0;
     struct state s = *state;
-    struct watch watch = {0.0, fabs(s.yaw_rate)};
-    for (int64_t i = 0, block; i < n;) {
-        double kq = 0.0;
-        for (block = next_block(n, i); block > 0; block--, i++) {
-            const double t = (double)i * h;
-            steer_at(f, t);
-            const struct loads a1 = accelerations_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
-            const double r2 = s.yaw_rate + half * a1.moment;
-            steer_at(f, t + half);
-            const struct loads a2 = accelerations_at(f, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
-                                                     s.vy + half * a1.y, r2);
-            const double r3 = s.yaw_rate + half * a2.moment;
-            const struct loads a3 =
-                accelerations_at(f, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
-            const double r4 = s.yaw_rate + h * a3.moment;
-            steer_at(f, t + h);
-            const struct loads a4 = accelerations_at(f, s.heading + h * r3, s.vx + h * a3.x, s.vy + h * a3.y, r4);
-            s.x = s.x + h * s.vx + square * (a1.x + a2.x + a3.x);
-            s.y = s.y + h * s.vy + square * (a1.y + a2.y + a3.y);
-            s.heading = s.heading + h * s.yaw_rate + square * (a1.moment + a2.moment + a3.moment);
-            s.vx = s.vx + sixth * (a1.x + 2.0 * a2.x + 2.0 * a3.x + a4.x);
-            s.vy = s.vy + sixth * (a1.y + 2.0 * a2.y + 2.0 * a3.y + a4.y);
-            s.yaw_rate = s.yaw_rate + sixth * (a1.moment + 2.0 * a2.moment + 2.0 * a3.moment + a4.moment);
-            kq = a1.kq;
-        }
-        look(&watch, kq, s.yaw_rate);
+    struct watch watch = {0.0, s.yaw_rate, s.yaw_rate};
+    for (int64_t i = 0; i < n; i++) {
+        const double t = (double)i * h;
+        steer_at(f, t);
+        const struct loads a1 = accelerations_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
+        const double r2 = s.yaw_rate + half * a1.moment;
+        steer_at(f, t + half);
+        const struct loads a2 = accelerations_at(f, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
+                                                 s.vy + half * a1.y, r2);
+        const double r3 = s.yaw_rate + half * a2.moment;
+        const struct loads a3 =
+            accelerations_at(f, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
+        const double r4 = s.yaw_rate + h * a3.moment;
+        steer_at(f, t + h);
+        const struct loads a4 = accelerations_at(f, s.heading + h * r3, s.vx + h * a3.x, s.vy + h * a3.y, r4);
+        s.x = s.x + h * s.vx + square * (a1.x + a2.x + a3.x);
+        s.y = s.y + h * s.vy + square * (a1.y + a2.y + a3.y);
+        s.heading = s.heading + h * s.yaw_rate + square * (a1.moment + a2.moment + a3.moment);
+        s.vx = s.vx + sixth * (a1.x + 2.0 * a2.x + 2.0 * a3.x + a4.x);
+        s.vy = s.vy + sixth * (a1.y + 2.0 * a2.y + 2.0 * a3.y + a4.y);
+        s.yaw_rate = s.yaw_rate + sixth * (a1.moment + 2.0 * a2.moment + 2.0 * a3.moment + a4.moment);
+        watch_loads(&watch, a1.kq);
+        watch_loads(&watch, a2.kq);
+        watch_loads(&watch, a3.kq);
+        watch_loads(&watch, a4.kq);
+        watch_yaw_rate(&watch, r2);
+        watch_yaw_rate(&watch, r3);
+        watch_yaw_rate(&watch, r4);
+        watch_yaw_rate(&watch, s.yaw_rate);
     }
     return stretch_of(f, &s, n, h, &watch);
 }
