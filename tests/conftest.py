@@ -28,7 +28,9 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def native_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The native FMU of this tree."""
+    """The native FMU of this tree, or the one that NATIVE_FMU names (a sanitized one, for example)."""
+    if given := os.environ.get("NATIVE_FMU"):
+        return Path(given)
     if not has_compiler():
         pytest.skip("no ziglang: pip install 'hovercraft-fmu[native]'")
     return build_native_fmu(tmp_path_factory.mktemp("native") / "HovercraftNative.fmu")

@@ -89,9 +89,9 @@ class Kernel:
 
     def __init__(self, library: Path) -> None:
         self.library: Any = CDLL(str(library))
-        self.library.loads_on.restype = CLoads
-        self.library.stability_number.restype = c_double
-        self.library.stability_number.argtypes = (c_double, POINTER(CCraft))
+        self.library.kernel_loads_on.restype = CLoads
+        self.library.kernel_stability_number.restype = c_double
+        self.library.kernel_stability_number.argtypes = (c_double, POINTER(CCraft))
 
     def advance(
         self,
@@ -108,7 +108,7 @@ class Kernel:
         number = INTEGRATORS.index(settings.integrator) + 1
         chosen = CSettings(settings.step_size, number, settings.tolerance)
         made = CStretch()
-        outcome = self.library.advance(
+        outcome = self.library.kernel_advance(
             byref(CState(*state)), byref(drive), byref(CCraft(*astuple(craft))), c_double(communication_step),
             byref(chosen), c_double(proposed), byref(made),
         )  # fmt: skip
@@ -117,10 +117,10 @@ class Kernel:
 
     def loads(self, state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
         arguments = byref(CState(*state)), byref(CControls(*controls)), byref(CCraft(*astuple(craft)))
-        return numbers_of(self.library.loads_on(*arguments), ("x", "y", "moment", "kq"))
+        return numbers_of(self.library.kernel_loads_on(*arguments), ("x", "y", "moment", "kq"))
 
     def stability_number(self, drag: float, craft: Craft) -> float:
-        return float(self.library.stability_number(drag, byref(CCraft(*astuple(craft)))))
+        return float(self.library.kernel_stability_number(drag, byref(CCraft(*astuple(craft)))))
 
 
 class Text:

@@ -84,7 +84,7 @@ def test_every_scene_and_method(name: str, method: str, libm: Kernel, shipped: K
         state, proposed = made.state, made.proposed
         outcome, made = shipped.advance(near, held, craft, end - time, how, other)
         near, other, count = made.state, made.proposed, count + made.substeps
-    parted = max(1e-12, 2e-15 * count) if method == "drag_implicit" else 1e-12
+    parted = max(1e-12, 1e-14 * count) if method == "drag_implicit" else 1e-12
     for value, wanted in zip(near, python, strict=True):
         assert abs(value - wanted) <= parted * max(1.0, abs(wanted))
 

@@ -302,7 +302,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component component, fmi2FMUstate stat
         return fmi2Error;
     if (!state || !size)
         return refuse_null(c, "fmi2SerializedFMUstateSize");
-    *size = serialized_size();
+    *size = instance_serialized_size();
     return fmi2OK;
 }
 
@@ -313,10 +313,10 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fm
         return fmi2Error;
     if (!state || !bytes)
         return refuse_null(c, "fmi2SerializeFMUstate");
-    if (size < serialized_size())
+    if (size < instance_serialized_size())
         return status_of(instance_say(&c->instance, REFUSED, "fmi2SerializeFMUstate: size = %u: must be %u bytes",
-                                      (unsigned long long)size, (unsigned long long)serialized_size()));
-    content_serialize(state, (unsigned char *)bytes);
+                                      (unsigned long long)size, (unsigned long long)instance_serialized_size()));
+    instance_serialize(state, (unsigned char *)bytes);
     return fmi2OK;
 }
 

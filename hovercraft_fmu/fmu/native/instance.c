@@ -125,7 +125,7 @@ static enum verdict take_up_start_values(struct instance *instance)
     };
     now->controls = inputs_of(now->reals);
     get_state(now->reals, &now->state);
-    now->reals[V_PROJECTED_AREA] = projected_area(&craft);
+    now->reals[V_PROJECTED_AREA] = kernel_projected_area(&craft);
     now->tuned = false;
     now->moved = now->acted = true;
     return FINE;
@@ -210,7 +210,7 @@ static enum verdict warn_of_the_step(struct instance *instance)
 {
     const struct content *now = &instance->now;
     const struct method *method = method_of(instance);
-    const double number = stability_number(now->drag, &now->craft), rotation = now->rotation;
+    const double number = kernel_stability_number(now->drag, &now->craft), rotation = now->rotation;
     enum verdict verdict = FINE;
     if (number > method->stability_limit && is_first(instance, STEP_UNSTABLE))
         verdict = instance_say(instance, WARNED,
@@ -229,7 +229,7 @@ static enum verdict warn_of_the_step(struct instance *instance)
 
 static enum verdict warn_of_held_inputs(struct instance *instance, const struct controls *controls)
 {
-    const struct controls limits = saturate(controls, &instance->now.craft);
+    const struct controls limits = kernel_saturate(controls, &instance->now.craft);
     const double values[] = {controls->thrust, controls->port, controls->starboard};
     const double held[] = {limits.thrust, limits.port, limits.starboard};
     enum verdict verdict = FINE;
@@ -270,7 +270,7 @@ static enum verdict make_drive(struct instance *instance, double step, struct dr
     const double *rates = instance->now.rates;
     *drive = (struct drive){inputs_of(instance->now.reals), {rates[0], rates[1], rates[2]}, false};
     drive->ramped = rates[0] != 0.0 || rates[1] != 0.0 || rates[2] != 0.0;
-    *end = controls_at(drive, step);
+    *end = kernel_controls_at(drive, step);
     if (is_finite_drive(end))
         return FINE;
     return instance_say(instance, REFUSED, "input derivatives over %r s: must lead to finite inputs", step);
@@ -290,7 +290,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     if (make_drive(instance, step, &drive, &end) == REFUSED)
         return REFUSED;
     const enum outcome outcome =
-        advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
+        kernel_advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
     if (outcome != ADVANCED)
         return refuse_step(instance, outcome, step, &stretch);
     now->state = stretch.state;
@@ -339,7 +339,7 @@ static enum verdict observe_motion(struct instance *instance)
     if (!instance_started(instance) && take_up_start_values(instance) == REFUSED)
         return REFUSED;
     const struct state *s = &now->state;
-    body_velocity(s, &reals[V_BODY_SURGE], &reals[V_BODY_SWAY]);
+    kernel_body_velocity(s, &reals[V_BODY_SURGE], &reals[V_BODY_SWAY]);
     reals[V_SPEED] = sqrt(s->vx * s->vx + s->vy * s->vy);
     if (check_finite(instance, MOTION, sizeof MOTION / sizeof *MOTION) == REFUSED)
         return REFUSED;
@@ -360,16 +360,16 @@ static enum verdict observe_action(struct instance *instance)
     double *reals = now->reals;
     if (!now->acted)
         return FINE;
-    const struct loads loads = loads_on(&now->state, &now->controls, &now->craft);
+    const struct loads loads = kernel_loads_on(&now->state, &now->controls, &now->craft);
     reals[V_FORCE_X] = loads.x;
     reals[V_FORCE_Y] = loads.y;
     reals[V_MOMENT] = loads.moment;
     reals[V_ACCELERATION_X] = loads.x / now->craft.mass;
     reals[V_ACCELERATION_Y] = loads.y / now->craft.mass;
     reals[V_ACCELERATION_YAW] = loads.moment / now->craft.inertia;
-    reals[V_APPLIED_THRUST] = saturate(&now->controls, &now->craft).thrust;
-    reals[V_APPLIED_STEERING] = steering(&now->controls, &now->craft);
-    reals[V_STABILITY_NUMBER] = stability_number(now->drag, &now->craft);
+    reals[V_APPLIED_THRUST] = kernel_saturate(&now->controls, &now->craft).thrust;
+    reals[V_APPLIED_STEERING] = kernel_steering(&now->controls, &now->craft);
+    reals[V_STABILITY_NUMBER] = kernel_stability_number(now->drag, &now->craft);
     reals[V_ROTATION_PER_SUBSTEP] = now->rotation;
     if (check_finite(instance, ACTION, sizeof ACTION / sizeof *ACTION) == REFUSED)
         return REFUSED;
@@ -589,11 +589,11 @@ static bool output_rate(const double *reals, unsigned reference, double *rate)
         *rate = reals[V_ACCELERATION_YAW];
         return true;
     case V_BODY_SURGE: /* the body frame turns: d(u)/dt = a_x + r*v, d(v)/dt = a_y - r*u */
-        body_velocity(&acceleration, &forward, &sideways);
+        kernel_body_velocity(&acceleration, &forward, &sideways);
         *rate = forward + r * reals[V_BODY_SWAY];
         return true;
     case V_BODY_SWAY:
-        body_velocity(&acceleration, &forward, &sideways);
+        kernel_body_velocity(&acceleration, &forward, &sideways);
         *rate = sideways - r * reals[V_BODY_SURGE];
         return true;
     case V_SPEED: /* at rest it can only grow */

@@ -1,5 +1,5 @@
-/* One craft behind a co-simulation interface: variables, life cycle, faults, warnings, state. It knows no standard: a face
-   (fmi2.c) translates. What it is given it checks, once; a refused call changes nothing. */
+/* One craft behind a co-simulation interface: variables, life cycle, faults, warnings, state. It knows no standard: a
+   face (fmi2.c) translates. What it is given it checks, once; a refused call changes nothing. */
 
 #ifndef HOVERCRAFT_INSTANCE_H
 #define HOVERCRAFT_INSTANCE_H
@@ -45,7 +45,7 @@ struct instance {
 };
 
 /* What a serialized state takes. */
-size_t serialized_size(void);
+size_t instance_serialized_size(void);
 
 void instance_start(struct instance *instance, teller *tell, void *sink);
 void instance_reset(struct instance *instance);
@@ -76,8 +76,8 @@ enum verdict instance_set_rates(struct instance *instance, const unsigned *refer
 enum verdict instance_get_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
                                 double *values);
 
-/* `bytes` has serialized_size() bytes. The same on every platform. */
-void content_serialize(const struct content *content, unsigned char *bytes);
+/* `bytes` has instance_serialized_size() bytes. The same on every platform. */
+void instance_serialize(const struct content *content, unsigned char *bytes);
 /* Refused: not complete and unchanged, or of another build. */
 enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
                                   struct content *content);

@@ -30,17 +30,17 @@ static inline double smaller(double a, double b)
 
 /* ---- craft.py */
 
-double projected_area(const struct craft *craft)
+double kernel_projected_area(const struct craft *craft)
 {
     return (craft->length + craft->width) / 2.0 * craft->height;
 }
 
-double drag_factor(const struct craft *craft)
+static double drag_factor(const struct craft *craft)
 {
-    return 0.5 * craft->air_density * projected_area(craft) * craft->drag_coefficient;
+    return 0.5 * craft->air_density * kernel_projected_area(craft) * craft->drag_coefficient;
 }
 
-double drag_center(const struct craft *craft)
+static double drag_center(const struct craft *craft)
 {
     return craft->drag_center_fraction * craft->length;
 }
@@ -57,7 +57,7 @@ static double clip(double value, double low, double high)
     return value < low ? low : value > high ? high : value;
 }
 
-struct controls saturate(const struct controls *controls, const struct craft *craft)
+struct controls kernel_saturate(const struct controls *controls, const struct craft *craft)
 {
     return (struct controls){
         clip(controls->thrust, craft->thrust_min, craft->thrust_max),
@@ -66,13 +66,13 @@ struct controls saturate(const struct controls *controls, const struct craft *cr
     };
 }
 
-double steering(const struct controls *controls, const struct craft *craft)
+double kernel_steering(const struct controls *controls, const struct craft *craft)
 {
-    const struct controls held = saturate(controls, craft);
+    const struct controls held = kernel_saturate(controls, craft);
     return craft->steering_force * (held.port - held.starboard);
 }
 
-struct controls controls_at(const struct drive *drive, double time)
+struct controls kernel_controls_at(const struct drive *drive, double time)
 {
     if (!drive->ramped)
         return drive->start;
@@ -93,7 +93,7 @@ struct load_function {
 
 static void steer(struct load_function *f, const struct controls *controls)
 {
-    const struct controls held = saturate(controls, f->craft);
+    const struct controls held = kernel_saturate(controls, f->craft);
     f->thrust = held.thrust;
     f->side = f->craft->steering_force * (held.port - held.starboard);
     f->turn = thruster_moment(f->craft) * (held.port - held.starboard);
@@ -103,7 +103,7 @@ static void steer(struct load_function *f, const struct controls *controls)
 static inline void steer_at(struct load_function *f, double time)
 {
     if (f->drive->ramped) {
-        const struct controls controls = controls_at(f->drive, time);
+        const struct controls controls = kernel_controls_at(f->drive, time);
         steer(f, &controls);
     }
 }
@@ -129,14 +129,14 @@ static inline struct loads loads_at(const struct load_function *f, double headin
     return (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, f->x_d * drag_y + f->turn, kq};
 }
 
-struct loads loads_on(const struct state *state, const struct controls *controls, const struct craft *craft)
+struct loads kernel_loads_on(const struct state *state, const struct controls *controls, const struct craft *craft)
 {
     const struct drive drive = {.start = *controls};
     const struct load_function f = load_function(&drive, craft);
     return loads_at(&f, state->heading, state->vx, state->vy, state->yaw_rate);
 }
 
-void body_velocity(const struct state *state, double *surge, double *sway)
+void kernel_body_velocity(const struct state *state, double *surge, double *sway)
 {
     double c, s;
     sine_cosine(state->heading, &s, &c);
@@ -393,7 +393,7 @@ static bool is_finite(const struct state *s)
            isfinite(s->yaw_rate);
 }
 
-enum outcome advance(const struct state *state, const struct drive *drive, const struct craft *craft,
+enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
                      double communication_step, const struct settings *settings, double proposed,
                      struct stretch *stretch)
 {
@@ -413,7 +413,7 @@ enum outcome advance(const struct state *state, const struct drive *drive, const
     return is_finite(&stretch->state) ? ADVANCED : NOT_FINITE;
 }
 
-double stability_number(double drag, const struct craft *craft)
+double kernel_stability_number(double drag, const struct craft *craft)
 {
     const double x_d = drag_center(craft);
     return 2.0 * drag * (1.0 / craft->mass + x_d * x_d / craft->inertia);

@@ -1,7 +1,8 @@
 /* The physics: model/craft.py, dynamics.py, integrators.py and subcycling.py, function by function, in the same order
    of operations. Derivations stand there. SI units, world frame: x right, y down, heading from +x toward +y.
 
-   It owns nothing and remembers nothing. Compile without contraction (-ffp-contract=off). */
+   It owns nothing and remembers nothing. Compile without contraction (-ffp-contract=off). Names that a linker sees
+   have a prefix: glibc, for one, still has an `advance` of its own. */
 
 #ifndef HOVERCRAFT_KERNEL_H
 #define HOVERCRAFT_KERNEL_H
@@ -76,22 +77,20 @@ static inline double larger(double a, double b)
     return b > a ? b : a;
 }
 
-double projected_area(const struct craft *craft);
-double drag_center(const struct craft *craft);
-double drag_factor(const struct craft *craft);
+double kernel_projected_area(const struct craft *craft);
 
-struct controls saturate(const struct controls *controls, const struct craft *craft);
-struct controls controls_at(const struct drive *drive, double time);
+struct controls kernel_saturate(const struct controls *controls, const struct craft *craft);
+struct controls kernel_controls_at(const struct drive *drive, double time);
 /* Side force [N] of both bow thrusters, after saturation. */
-double steering(const struct controls *controls, const struct craft *craft);
-struct loads loads_on(const struct state *state, const struct controls *controls, const struct craft *craft);
+double kernel_steering(const struct controls *controls, const struct craft *craft);
+struct loads kernel_loads_on(const struct state *state, const struct controls *controls, const struct craft *craft);
 /* Surge and sway [m/s]. */
-void body_velocity(const struct state *state, double *surge, double *sway);
-double stability_number(double drag, const struct craft *craft);
+void kernel_body_velocity(const struct state *state, double *surge, double *sway);
+double kernel_stability_number(double drag, const struct craft *craft);
 
 /* The state one communication step [s], greater than 0, later. `proposed` [s] is what the last stretch of the adaptive
    method returned, 0 at the start. */
-enum outcome advance(const struct state *state, const struct drive *drive, const struct craft *craft,
+enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
                      double communication_step, const struct settings *settings, double proposed,
                      struct stretch *stretch);
 

@@ -58,6 +58,27 @@ static void exchange_doubles(struct cursor *cursor, void *first, size_t bytes)
         exchange_double(cursor, (double *)first + i);
 }
 
+static bool is_state(unsigned reference)
+{
+    for (unsigned i = 0; i < STATE_COUNT; i++)
+        if (STATES[i] == reference)
+            return true;
+    return false;
+}
+
+/* Before the start the state is what the host has set. */
+static void exchange_state(struct cursor *cursor, struct content *c)
+{
+    double *const parts[STATE_COUNT] = {&c->state.x,  &c->state.y,  &c->state.heading,
+                                        &c->state.vx, &c->state.vy, &c->state.yaw_rate};
+    const bool started = c->phase == STEPPING || c->phase == TERMINATED;
+    for (unsigned i = 0; i < STATE_COUNT; i++) {
+        double value = started ? *parts[i] : c->reals[STATES[i]];
+        exchange_double(cursor, &value);
+        *parts[i] = c->reals[STATES[i]] = value;
+    }
+}
+
 /* All of the content that cannot be worked out from the rest; the same for writing and reading. */
 static void exchange(struct cursor *cursor, struct content *c)
 {
@@ -72,11 +93,11 @@ static void exchange(struct cursor *cursor, struct content *c)
     exchange_double(cursor, &c->settings.tolerance);
     exchange_double(cursor, &c->time);
     for (unsigned i = 0; i < VARIABLE_COUNT; i++)
-        if (VARIABLES[i].start_given && VARIABLES[i].kind == REAL)
+        if (VARIABLES[i].start_given && VARIABLES[i].kind == REAL && !is_state(i))
             exchange_double(cursor, &c->reals[i]);
     exchange_doubles(cursor, c->rates, sizeof c->rates);
     exchange_double(cursor, &c->hosts_tolerance);
-    exchange_doubles(cursor, &c->state, sizeof c->state);
+    exchange_state(cursor, c);
     exchange_doubles(cursor, &c->controls, sizeof c->controls);
     exchange_doubles(cursor, &c->craft, sizeof c->craft);
     exchange_double(cursor, &c->proposed);
@@ -86,7 +107,7 @@ static void exchange(struct cursor *cursor, struct content *c)
     c->tuned = tuned != 0;
 }
 
-size_t serialized_size(void)
+size_t instance_serialized_size(void)
 {
     struct content content = {.phase = INSTANTIATED};
     struct cursor cursor = {MEASURE, NULL, NULL, HEAD_SIZE};
@@ -102,7 +123,7 @@ static uint64_t checksum(const unsigned char *bytes, size_t n)
     return sum;
 }
 
-void content_serialize(const struct content *content, unsigned char *bytes)
+void instance_serialize(const struct content *content, unsigned char *bytes)
 {
     struct content copy = *content;
     struct cursor cursor = {WRITE, bytes, NULL, MAGIC_SIZE};
@@ -131,7 +152,8 @@ static bool is_of_this_build(const unsigned char *bytes, size_t size)
     struct cursor cursor = {READ, NULL, bytes, MAGIC_SIZE};
     int32_t version = 0;
     exchange_integer(&cursor, &version);
-    return version == VERSION && size == serialized_size() && memcmp(bytes + cursor.at, BUILD, BUILD_SIZE) == 0;
+    return version == VERSION && size == instance_serialized_size() &&
+           memcmp(bytes + cursor.at, BUILD, BUILD_SIZE) == 0;
 }
 
 /* The words are right; whoever can work out a checksum may still have written anything. */
@@ -158,7 +180,7 @@ enum verdict instance_deserialize(struct instance *instance, const unsigned char
                             BUILD);
     *content = instance->now; /* what is not among the bytes is worked out again */
     exchange(&cursor, content);
-    content->reals[V_PROJECTED_AREA] = projected_area(&content->craft);
+    content->reals[V_PROJECTED_AREA] = kernel_projected_area(&content->craft);
     content->moved = content->acted = true;
     if (!is_possible(content))
         return instance_say(instance, REFUSED, "serialized FMU state of %u bytes: must be one that this FMU wrote",

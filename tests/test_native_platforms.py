@@ -1,0 +1,187 @@
+"""The same bits on every platform, many instances at once, nothing left behind: through hosts in C."""
+
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hovercraft_fmu.fmu.description import NATIVE
+from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, MOTION, STATES
+from hovercraft_fmu.fmu.native_header import constant
+from hovercraft_fmu.fmu.native_package import OPTIONS, PLATFORMS, compiler
+from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.simulation import Run, plan, schedule
+from tests.lowlevel import one
+from tests.native import C_TESTS, c_compiler
+
+STEPS = {"semi_implicit_euler": 0.001, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
+HASHED = (*STATES, *MOTION, "force.x", "force.y", "moment", "stability_number")
+"""What the host in C hashes, in its order."""
+ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
+WINE = "/usr/lib/wine/wine64"
+Elsewhere = dict[str, str]
+
+
+def runs() -> dict[str, Run]:
+    """Every scene with every method."""
+    return {
+        f"{scene}_{method}": plan(scene, start_values={"integrator": method, "step_size": step})
+        for scene in SCENES
+        for method, step in STEPS.items()
+    }
+
+
+def runs_header() -> str:
+    """The runs as tables of C."""
+    lines = ["struct run { const char *name; unsigned references[20]; double values[20]; unsigned starts; int method;"]
+    lines += ["             const double (*rows)[5]; unsigned steps; };"]
+    table = []
+    for name, run in runs().items():
+        rows = [(time, end - time, *held) for time, end, held in schedule(run)]
+        lines += [f"static const double {name}[][5] = {{", *(f"    {_braced(map(repr, row))}," for row in rows), "};"]
+        values = {key: value for key, value in run.start_values.items() if key != "integrator"}
+        references = _braced(constant(key) for key in values)
+        numbers = _braced(repr(float(value)) for value in values.values())
+        method = run.value("integrator")
+        table.append(f'    {{"{name}", {references}, {numbers}, {len(values)}, {method}, {name}, {len(rows)}}},')
+    return "\n".join([*lines, "static const struct run RUNS[] = {", *table, "};", ""])
+
+
+def _braced(parts: Iterable[str]) -> str:
+    return "{" + ", ".join(parts) + "}"
+
+
+@pytest.fixture(scope="module")
+def unpacked(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("unpacked")
+    with zipfile.ZipFile(native_fmu) as archive:
+        archive.extractall(folder)
+    (folder / "sources" / "runs.h").write_text(runs_header())
+    return folder
+
+
+def hashes(unpacked: Path, platform: str, library: str, *runner: str, env: Elsewhere | None = None) -> dict[str, str]:
+    """What the host in C prints on a platform: run -> hash."""
+    where = (unpacked / "binaries" / library).parent
+    target = PLATFORMS[platform]
+    program = "trajectory.exe" if target.suffix == ".dll" else "trajectory"
+    options = (
+        ["-nostdlib", "-Wl,--entry=start", "-lkernel32"] if target.suffix == ".dll" else ["-ldl"]
+    )  # fmt: skip
+    command = [*compiler(target), f'-DLIBRARY="./{Path(library).name}"', "-I", str(unpacked / "sources"),
+               str(C_TESTS / "trajectory.c"), *options, "-o", program]  # fmt: skip
+    done = subprocess.run(command, cwd=where, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run(
+        [*runner, f"./{program}"], cwd=where, env={**os.environ, **(env or {})}, capture_output=True, text=True,
+        check=False, timeout=600,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = dict(line.split() for line in done.stdout.splitlines())
+    assert set(found) == set(runs())
+    return found
+
+
+@pytest.fixture(scope="module")
+def here(unpacked: Path) -> dict[str, str]:
+    """The hashes on this machine."""
+    if sys.platform != "linux" or os.uname().machine != "x86_64":
+        pytest.skip("not x86-64 Linux")
+    return hashes(unpacked, "x86_64-linux", f"linux64/{NATIVE.identifier}.so")
+
+
+def test_the_hash_is_that_of_the_trajectory(here: dict[str, str], native_fmu: Path) -> None:
+    """Through fmpy, one run."""
+    run = runs()["turn_rk4"]
+    references = [BY_NAME[name].reference for name in HASHED]
+    total = 0xCBF29CE484222325
+    with one(native_fmu) as (instance, _):
+        _start(instance, run)
+        for time, end, held in schedule(run):
+            instance.setReal([BY_NAME[name].reference for name in INPUTS], list(held))
+            instance.doStep(time, end - time)
+            for byte in struct.pack(f"<{len(HASHED)}d", *instance.getReal(references)):
+                total = ((total ^ byte) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF
+    assert here["turn_rk4"] == f"{total:016x}"
+    assert len(set(here.values())) == len(here)
+
+
+def _start(instance: Any, run: Run) -> None:
+    for name, value in run.start_values.items():
+        put = instance.setReal if BY_NAME[name].kind == "Real" else instance.setInteger
+        put([BY_NAME[name].reference], [value])
+    instance.setupExperiment()
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+
+
+def test_the_same_bits_on_arm64(unpacked: Path, here: dict[str, str]) -> None:
+    qemu = shutil.which("qemu-aarch64")
+    if not qemu or not ARM_LIBRARIES.exists():
+        pytest.skip("no qemu-aarch64, or no libraries for it: apt-get install qemu-user libc6-arm64-cross")
+    library = f"aarch64-linux/{NATIVE.identifier}.so"
+    assert hashes(unpacked, "aarch64-linux", library, qemu, "-L", str(ARM_LIBRARIES)) == here
+
+
+def test_the_same_bits_on_windows(unpacked: Path, here: dict[str, str], tmp_path: Path) -> None:
+    wine = shutil.which("wine64") or shutil.which(WINE)
+    if not wine:
+        pytest.skip("no wine64: apt-get install wine64")
+    env = {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all", "DISPLAY": ""}
+    assert hashes(unpacked, "x86_64-windows", f"win64/{NATIVE.identifier}.dll", wine, env=env) == here
+
+
+# ---- many at once, again and again
+
+
+def host(unpacked: Path, name: str, *options: str, library: bool) -> Path:
+    """A host of tests/c: with the FMU's library, or compiled together with its sources."""
+    if sys.platform != "linux":
+        pytest.skip("not Linux")
+    program = unpacked / f"{name}{''.join(options)}"
+    folder = unpacked / "binaries" / "linux64"
+    parts = (
+        [str(folder / f"{NATIVE.identifier}.so"), f"-Wl,-rpath,{folder}"]
+        if library
+        else [str(unpacked / "sources" / source) for source in NATIVE.sources]
+    )
+    command = [c_compiler(), *OPTIONS, "-Wall", "-Wextra", "-Werror", "-I", str(unpacked / "sources"), *options]
+    done = subprocess.run(
+        [*command, str(C_TESTS / f"{name}.c"), *parts, "-pthread", "-lm", "-o", str(program)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return program
+
+
+def printed_by(program: Path) -> str:
+    done = subprocess.run([str(program)], capture_output=True, text=True, check=False, timeout=600)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.strip()
+
+
+SANITIZERS = {"address": ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+              "thread": ("-g", "-fsanitize=thread")}  # fmt: skip
+
+
+def test_eight_threads_of_a_thousand_instances(unpacked: Path) -> None:
+    assert printed_by(host(unpacked, "many", library=True)) == "8000"
+
+
+@pytest.mark.parametrize("sanitizer", SANITIZERS)
+def test_eight_threads_of_a_thousand_instances_sanitized(sanitizer: str, unpacked: Path) -> None:
+    """Memory, undefined behaviour, leaks; and races."""
+    assert printed_by(host(unpacked, "many", *SANITIZERS[sanitizer], library=False)) == "8000"
+
+
+def test_a_hundred_thousand_cycles_leave_nothing_behind(unpacked: Path) -> None:
+    grown = int(printed_by(host(unpacked, "cycles", library=True)))
+    print(f"resident memory grew by {grown} bytes over 90 000 cycles")
+    assert grown < 1_000_000
