@@ -157,8 +157,8 @@ print("ok")
     assert fresh(code, fmu).strip() == "ok"
 
 
-def test_fmutool_reports_nothing(fmu: Path) -> None:
-    command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", str(fmu), "-check"]
+def test_fmutool_reports_nothing(each_fmu: Path) -> None:
+    command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", str(each_fmu), "-check"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     printed = done.stdout + done.stderr
     assert "compliant with FMI-2.0" in printed
@@ -166,10 +166,10 @@ def test_fmutool_reports_nothing(fmu: Path) -> None:
     assert not [line for line in printed.splitlines() if line.startswith(("ERROR", "WARNING", "CRITICAL"))]
 
 
-def test_fmpy_validates(fmu: Path) -> None:
+def test_fmpy_validates(each_fmu: Path) -> None:
     from fmpy.validation import validate_fmu
 
-    assert validate_fmu(str(fmu)) == []
+    assert validate_fmu(str(each_fmu)) == []
 
 
 def test_what_is_inside(fmu: Path) -> None:

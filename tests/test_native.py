@@ -77,7 +77,7 @@ def test_every_scene_and_method_is_close_to_the_bare_model(name: str, method: st
 
 def test_other_hosts_give_the_bits_that_fmpy_gives(native_fmu: Path) -> None:
     expected = run_in("fmpy", native_fmu)
-    for name in ("libcosimpy", "ecospy", "fmucontainer"):
+    for name in ("libcosimpy", "ecospy", "fmucontainer", "C host"):
         if missing := HOSTS[name].missing():
             pytest.skip(f"{name}: {missing}")
         assert run_in(name, native_fmu) == expected, name

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import fmpy
 import pytest
+from click.testing import CliRunner
 from lxml import etree
 
+from hovercraft_fmu import cli
 from hovercraft_fmu.fmu import native_package
 from hovercraft_fmu.fmu.description import NATIVE
 from hovercraft_fmu.fmu.interface import BY_NAME
@@ -116,7 +118,7 @@ def test_the_libraries_of_macos(archive: dict[str, bytes]) -> None:
     for part in parts:
         library = dylib(part)
         assert library.exports - OF_THE_LINKER == {f"_{name}" for name in FUNCTIONS}
-        assert library.undefined <= {*(f"_{name}" for name in OF_LIBC), "___bzero", "dyld_stub_binder"}
+        assert library.undefined <= {*(f"_{name}" for name in OF_LIBC), "_bzero", "___bzero", "dyld_stub_binder"}
         assert library.needed == {"/usr/lib/libSystem.B.dylib"}
         assert library.name == f"@rpath/{NAME}.dylib"
         assert library.minimum == (11, 0)
@@ -171,6 +173,19 @@ def test_without_the_compiler_one_line_says_what_to_do(monkeypatch: pytest.Monke
     monkeypatch.setattr(native_package, "has_compiler", lambda: False)
     with pytest.raises(ModuleNotFoundError, match=re.escape("pip install 'hovercraft-fmu[native]'")):
         native_package.build_native_fmu(tmp_path / "X.fmu")
+
+
+def test_the_command_builds_both_or_says_why_not(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    python, native = Path("build/Hovercraft.fmu"), Path(f"build/{NAME}.fmu")
+    done = CliRunner().invoke(cli.commands, ["build", "--native"])
+    assert (done.exit_code, python.exists(), native.exists()) == (0, False, True)
+    assert done.stdout.startswith(f"{native}: ")
+    native.unlink()
+    monkeypatch.setattr(cli, "has_compiler", lambda: False)
+    done = CliRunner().invoke(cli.commands, ["build"])
+    assert (done.exit_code, python.exists(), native.exists()) == (0, True, False)
+    assert "no native FMU: its compiler is not installed: pip install 'hovercraft-fmu[native]'" in done.stdout
 
 
 def test_a_compiler_that_fails_is_heard(tmp_path: Path) -> None:

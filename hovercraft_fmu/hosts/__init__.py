@@ -190,7 +190,7 @@ def run_fmucontainer(fmu: Path) -> list[list[float]]:
 
 
 def run_c(fmu: Path) -> list[list[float]]:
-    """A host in C, compiled here, with Python's library preloaded: what a tool that is not Python does."""
+    """A host in C, compiled here; for a Python FMU Python's library is preloaded, as a tool that is not Python must."""
     description = fmpy.read_model_description(fmu)
     with tempfile.TemporaryDirectory() as folder:
         fmpy.extract(fmu, unzipdir=folder)
@@ -200,7 +200,9 @@ def run_c(fmu: Path) -> list[list[float]]:
                    repr(COMMUNICATION_STEP), ",".join(map(str, INPUT_REFERENCES)),
                    ",".join(map(str, OUTPUT_REFERENCES))]  # fmt: skip
         lines = "".join(" ".join(map(repr, controls)) + "\n" for controls in CONTROLS)
-        env = {"PATH": os.defpath, "LD_PRELOAD": python_library() or ""}
+        env = {"PATH": os.defpath}
+        if Path(folder, "resources", "slavemodule.txt").exists():
+            env["LD_PRELOAD"] = python_library() or ""
         done = subprocess.run(command, input=lines, env=env, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise HostError(f"exit status {done.returncode}: {done.stderr.strip()}")
