@@ -1,0 +1,41 @@
+"""python -m tests.fuzz [SECONDS]: any sequence of FMI calls on the sanitized native FMU, ten minutes by default."""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from hovercraft_fmu.fmu.description import NATIVE
+from tests.native import C_TESTS, written_sources
+
+SANITIZE = ("-g", "-O1", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
+DEFAULT = 600
+"""s"""
+
+
+def missing() -> str:
+    """Why it cannot run here; '' where it can."""
+    return "" if shutil.which("clang") and sys.platform == "linux" else "no clang: apt-get install clang"
+
+
+def fuzz(folder: Path, seconds: int) -> str:
+    """Run for so long in a folder; libFuzzer's report. Raises AssertionError with it where there is a finding."""
+    written_sources(folder)
+    sources = [folder / name for name in NATIVE.sources]
+    command = ["clang", "-std=c11", "-Wall", "-Wextra", "-ffp-contract=off", *SANITIZE, "-I", str(folder),
+               *map(str, sources), str(C_TESTS / "fuzz.c"), "-lm", "-o", str(folder / "fuzz")]  # fmt: skip
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (built.returncode, built.stderr) == (0, "")
+    run = [str(folder / "fuzz"), f"-max_total_time={seconds}", "-max_len=4000", "-timeout=30", "-seed=1",
+           "-print_final_stats=1", "-verbosity=0"]  # fmt: skip
+    done = subprocess.run(run, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-5000:]
+    return done.stderr
+
+
+if __name__ == "__main__":
+    if missing():
+        sys.exit(missing())
+    with tempfile.TemporaryDirectory() as place:
+        print(fuzz(Path(place), int(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT))

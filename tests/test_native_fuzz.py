@@ -1,0 +1,38 @@
+"""Any sequence of FMI calls with any arguments, 20 s; `python -m tests.fuzz` takes ten minutes."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests import fuzz
+
+
+def test_twenty_seconds_without_a_finding(tmp_path: Path) -> None:
+    if missing := fuzz.missing():
+        pytest.skip(missing)
+    report = fuzz.fuzz(tmp_path, 20)
+    done = re.search(r"number_of_executed_units: (\d+)", report)
+    assert done
+    assert int(done[1]) > 10_000
+
+
+def test_it_would_find_a_refused_call_that_changes_something(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A test of the test: an instance whose inputs are set before all of them are checked."""
+    if missing := fuzz.missing():
+        pytest.skip(missing)
+    whole = fuzz.written_sources
+
+    def spoiled(folder: Path) -> Path:
+        path = whole(folder) / "instance.c"
+        text = path.read_text(encoding="utf-8")
+        check = "    for (size_t i = 0; i < n; i++) { /* all are checked before one is set */\n"
+        assert check in text
+        early = "        if (is_real(references[i]) && input_of(references[i]) < INPUT_COUNT)\n"
+        early += "            instance->now.reals[references[i]] = 1.0;\n"
+        path.write_text(text.replace(check, check + early), encoding="utf-8")
+        return folder
+
+    monkeypatch.setattr(fuzz, "written_sources", spoiled)
+    with pytest.raises(AssertionError, match="a refused call changed something"):
+        fuzz.fuzz(tmp_path, 60)
