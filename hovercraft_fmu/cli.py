@@ -195,6 +195,16 @@ def scene_terms(output: Path) -> None:
     OUTPUT.print(report)
 
 
+@commands.command("cross-check")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+def cross_check_command(folder: Path) -> None:
+    """Write what the FMI cross-check asks for: the native FMU, inputs, options, a reference result."""
+    from .cross_check import write_cross_check
+
+    for place in write_cross_check(folder):
+        OUTPUT.print(f"wrote {place}")
+
+
 # ---- what the commands share
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests import fuzz
+from tests.native import written_sources
 
 
 def test_twenty_seconds_without_a_finding(tmp_path: Path) -> None:
@@ -21,7 +22,7 @@ def test_it_would_find_a_refused_call_that_changes_something(tmp_path: Path, mon
     """A test of the test: an instance whose inputs are set before all of them are checked."""
     if missing := fuzz.missing():
         pytest.skip(missing)
-    whole = fuzz.written_sources
+    whole = written_sources
 
     def spoiled(folder: Path) -> Path:
         path = whole(folder) / "instance.c"

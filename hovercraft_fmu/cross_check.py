@@ -1,0 +1,56 @@
+"""What the FMI cross-check asks of an exporting tool: the native FMU, inputs, options and a reference result."""
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._version import __version__
+from .fmu.description import NATIVE
+from .fmu.interface import INPUTS, VARIABLES
+from .fmu.native_package import build_native_fmu
+from .scenes import scene
+from .simulation import simulate
+
+SCENE = "slalom"
+"""Starts at rest with all start values as they are; its inputs are continuous."""
+PLATFORMS = ("linux64", "win64", "darwin64")
+OUTPUTS = tuple(variable.name for variable in VARIABLES if variable.causality == "output")
+README = """\
+{name}: a hovercraft that moves in the plane, FMI 2.0 co-simulation, made by hovercraft-fmu {version}.
+
+It needs nothing where it runs. The inputs in {name}_in.csv are linear between rows. The reference result is of fmpy,
+with communication steps of {step} s, each cut into 100 sub-steps of the default method. Start values are the FMU's.
+"""
+
+
+def write_cross_check(folder: Path) -> list[Path]:
+    """Write the files of the native FMU for every platform into a vendor's repository; return their folders.
+
+    Raises:
+        ModuleNotFoundError: the compiler of the native FMU is not installed.
+        OSError: a file cannot be written.
+    """
+    name, chosen = NATIVE.identifier, scene(SCENE)
+    places = [folder / "fmus" / "2.0" / "cs" / each / "hovercraft-fmu" / __version__ / name for each in PLATFORMS]
+    first = places[0]
+    fmu = build_native_fmu(first / f"{name}.fmu")
+    result = simulate(chosen, fmu)
+    step = chosen.communication_step
+    options = {"StartTime": 0.0, "StopTime": chosen.stop_time, "StepSize": step, "RelTol": 1e-4}
+    (first / f"{name}_ref.opt").write_text("".join(f"{key},{value!r}\n" for key, value in options.items()))
+    _write_csv(first / f"{name}_in.csv", chosen.signals, ("time", *INPUTS))
+    _write_csv(first / f"{name}_ref.csv", result.data, ("time", *OUTPUTS))
+    (first / "ReadMe.txt").write_text(README.format(name=name, version=__version__, step=step))
+    for place in places[1:]:
+        shutil.copytree(first, place, dirs_exist_ok=True)
+    return places
+
+
+def _write_csv(path: Path, table: NDArray[np.void], names: Sequence[str]) -> None:
+    """All digits; names in quotes, as they have dots."""
+    header = ",".join(f'"{name}"' for name in names)
+    rows = "\n".join(",".join(repr(float(value)) for value in row) for row in table[list(names)])
+    path.write_text(f"{header}\n{rows}\n")
