@@ -166,11 +166,12 @@ def benchmark() -> None:
 @click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "trade", show_default=True)
 def trade(quick: bool, output: Path) -> None:
     """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes."""
-    from .trade import work_precision
+    from .trade import native_costs, work_precision
 
     with _progress(1.0, "measuring") as tell:
         report = work_precision.run(output, quick, tell)
     OUTPUT.print(report)
+    OUTPUT.print(native_costs.run(output))
 
 
 @commands.command()

@@ -137,7 +137,7 @@ static fmi2Status step(fmi2Component craft, struct bytes *bytes)
         return fmi2DoStep(craft, point, size, fmi2True);
     }
     const double n = size / real_of(craft, V_STEP_SIZE);
-    return n > FEW_SUBSTEPS && n < TOO_MANY ? fmi2OK : fmi2DoStep(craft, point, size, fmi2True);
+    return n <= FEW_SUBSTEPS || n >= TOO_MANY ? fmi2DoStep(craft, point, size, fmi2True) : fmi2OK;
 }
 
 static fmi2Status reals(fmi2Component craft, struct bytes *bytes, const struct world *world)

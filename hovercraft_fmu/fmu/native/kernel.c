@@ -2,9 +2,7 @@
 
 #include <math.h>
 
-#ifndef HOVERCRAFT_LIBM
 #include "trig.h"
-#endif
 
 static const double MIN_STEP = 1e-12;     /* s: below it the adaptive method gives up */
 static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
@@ -12,15 +10,22 @@ static const double WHOLE = 1e-9;         /* relative: this close to a whole num
 static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds what is smaller, ties to even */
 
 /* With HOVERCRAFT_LIBM the platform's functions, which Python uses, too. */
-static inline void sine_cosine(double angle, double *sine, double *cosine)
-{
 #ifdef HOVERCRAFT_LIBM
-    *cosine = cos(angle);
-    *sine = sin(angle);
-#else
-    trig_sine_cosine(angle, sine, cosine);
-#endif
+
+static inline struct trig_pair sine_cosine(double angle, struct trig_turn *turn)
+{
+    (void)turn;
+    return (struct trig_pair){sin(angle), cos(angle)};
 }
+
+#else
+
+static inline struct trig_pair sine_cosine(double angle, struct trig_turn *turn)
+{
+    return trig_sine_cosine(angle, turn);
+}
+
+#endif
 
 /* Python's min(a, b). */
 static inline double smaller(double a, double b)
@@ -89,6 +94,7 @@ struct load_function {
     double thrust, side, turn; /* N, N, N.m */
     const struct craft *craft;
     const struct drive *drive;
+    struct trig_turn last; /* of the heading */
 };
 
 static void steer(struct load_function *f, const struct controls *controls)
@@ -115,11 +121,11 @@ static struct load_function load_function(const struct drive *drive, const struc
     return f;
 }
 
-static inline struct loads loads_at(const struct load_function *f, double heading, double vx, double vy,
+static inline struct loads loads_at(struct load_function *f, double heading, double vx, double vy,
                                     double yaw_rate)
 {
-    double c, s;
-    sine_cosine(heading, &s, &c);
+    const struct trig_pair turned = sine_cosine(heading, &f->last);
+    const double c = turned.cosine, s = turned.sine;
     const double u = c * vx + s * vy;
     const double w = c * vy - s * vx + yaw_rate * f->x_d;
     const double kq = f->k * sqrt(u * u + w * w);
@@ -132,14 +138,15 @@ static inline struct loads loads_at(const struct load_function *f, double headin
 struct loads kernel_loads_on(const struct state *state, const struct controls *controls, const struct craft *craft)
 {
     const struct drive drive = {.start = *controls};
-    const struct load_function f = load_function(&drive, craft);
+    struct load_function f = load_function(&drive, craft);
     return loads_at(&f, state->heading, state->vx, state->vy, state->yaw_rate);
 }
 
 void kernel_body_velocity(const struct state *state, double *surge, double *sway)
 {
-    double c, s;
-    sine_cosine(state->heading, &s, &c);
+    struct trig_turn turn = {.quarters = 0.0};
+    const struct trig_pair turned = sine_cosine(state->heading, &turn);
+    const double c = turned.cosine, s = turned.sine;
     *surge = c * state->vx + s * state->vy;
     *sway = c * state->vy - s * state->vx;
 }
@@ -163,7 +170,7 @@ static inline void watch_yaw_rate(struct watch *watch, double yaw_rate)
     watch->right = larger(watch->right, yaw_rate);
 }
 
-static struct stretch stretch_of(const struct load_function *f, const struct state *s, int64_t n, double h,
+static struct stretch stretch_of(struct load_function *f, const struct state *s, int64_t n, double h,
                                  const struct watch *watch)
 {
     const double most = larger(watch->most, loads_at(f, s->heading, s->vx, s->vy, s->yaw_rate).kq);
@@ -206,9 +213,9 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
     struct state z = *state;
     struct watch watch = {0.0, z.yaw_rate, z.yaw_rate};
     for (int64_t i = 0; i < n; i++) {
-        double c, s;
         steer_at(f, (double)i * h);
-        sine_cosine(z.heading, &s, &c);
+        const struct trig_pair turned = sine_cosine(z.heading, &f->last);
+        const double c = turned.cosine, s = turned.sine;
         const double kq = drag_per_speed(f, c, s, z.vx, z.vy, z.yaw_rate);
         const double g = h * kq;
         const double surge = (mass * (c * z.vx + s * z.vy) + h * f->thrust) / (mass + g);
@@ -230,7 +237,7 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
 }
 
 /* The accelerations in place of the loads. */
-static inline struct loads accelerations_at(const struct load_function *f, double heading, double vx, double vy,
+static inline struct loads accelerations_at(struct load_function *f, double heading, double vx, double vy,
                                             double yaw_rate)
 {
     const struct loads loads = loads_at(f, heading, vx, vy, yaw_rate);
@@ -297,7 +304,7 @@ struct rates {
     double kq;
 };
 
-static struct rates rates_at(const struct load_function *f, const double y[COMPONENTS])
+static struct rates rates_at(struct load_function *f, const double y[COMPONENTS])
 {
     const struct loads a = accelerations_at(f, y[2], y[3], y[4], y[5]);
     return (struct rates){{y[3], y[4], y[5], a.x, a.y, a.moment}, a.kq};

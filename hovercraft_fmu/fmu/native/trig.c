@@ -1,59 +1,9 @@
-/* Sine and cosine with the same bits on every platform: fdlibm's kernels and its reduction of the argument.
-
-   Both are worked out together, with one reduction; below 2^20*pi/2 the reduction has one path. The arithmetic, its
-   order and its constants are fdlibm's (k_sin.c, k_cos.c, e_rem_pio2.c, k_rem_pio2.c, as FreeBSD and musl keep them),
-   and come with this notice:
-
-   ====================================================
-   Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
-
-   Developed at SunSoft, a Sun Microsystems, Inc. business.
-   Permission to use, copy, modify, and distribute this
-   software is freely granted, provided that this notice
-   is preserved.
-   ====================================================
-   The reduction of medium arguments: optimized by Bruce D. Evans.
-
-   Compile without contraction (-ffp-contract=off): a fused multiply-add has other bits. */
+/* The rare cases of trig.h, where the notice stands: all this is fdlibm's. */
 
 #include "trig.h"
 
 #include <stdint.h>
 #include <string.h>
-
-static const double QUARTER = 0x1.921fb54442d18p-1; /* pi/4 */
-static const double TINY = 0x1p-26;                 /* below it sin(x) is x and cos(x) is 1 */
-static const double LARGE = 0x1.921fbp+20;          /* 2^20*pi/2, above it all bits of 2/pi count */
-
-/* sin(x + y) on [-pi/4, pi/4]; y is the tail of x. */
-static double kernel_sine(double x, double y)
-{
-    static const double S1 = -1.66666666666666324348e-01, /* 0xBFC55555, 0x55555549 */
-        S2 = 8.33333333332248946124e-03,                  /* 0x3F811111, 0x1110F8A6 */
-        S3 = -1.98412698298579493134e-04,                 /* 0xBF2A01A0, 0x19C161D5 */
-        S4 = 2.75573137070700676789e-06,                  /* 0x3EC71DE3, 0x57B1FE7D */
-        S5 = -2.50507602534068634195e-08,                 /* 0xBE5AE5E6, 0x8A2B9CEB */
-        S6 = 1.58969099521155010221e-10;                  /* 0x3DE5D93A, 0x5ACFD57C */
-    const double z = x * x, w = z * z;
-    const double r = S2 + z * (S3 + z * S4) + z * w * (S5 + z * S6);
-    const double v = z * x;
-    return x - ((z * (0.5 * y - v * r) - y) - v * S1);
-}
-
-/* cos(x + y) on [-pi/4, pi/4]; y is the tail of x. */
-static double kernel_cosine(double x, double y)
-{
-    static const double C1 = 4.16666666666666019037e-02, /* 0x3FA55555, 0x5555554C */
-        C2 = -1.38888888888741095749e-03,                /* 0xBF56C16C, 0x16C15177 */
-        C3 = 2.48015872894767294178e-05,                 /* 0x3EFA01A0, 0x19CB1590 */
-        C4 = -2.75573143513906633035e-07,                /* 0xBE927E4F, 0x809C52AD */
-        C5 = 2.08757232129817482790e-09,                 /* 0x3E21EE9E, 0xBDB4B1C4 */
-        C6 = -1.13596475577881948265e-11;                /* 0xBDA8FAE9, 0xBE8838D4 */
-    const double z = x * x, w = z * z;
-    const double r = z * (C1 + z * (C2 + z * C3)) + w * w * (C4 + z * (C5 + z * C6));
-    const double hz = 0.5 * z, one = 1.0 - hz;
-    return one + (((1.0 - one) - hz) + (z * r - x * y));
-}
 
 static uint64_t bits_of(double x)
 {
@@ -74,36 +24,35 @@ static int exponent_of(double x)
     return (int)(bits_of(x) >> 52 & 0x7ff);
 }
 
-/* x - n*pi/2 as y[0] + y[1], and n: |x| below 2^20*pi/2. */
-static int reduce_medium(double x, double y[2])
+static const double PIO2_1 = 1.57079632673412561417e+00, /* 0x3FF921FB, 0x54400000: first 33 bits of pi/2 */
+    PIO2_1T = 6.07710050650619224932e-11,                /* 0x3DD0B461, 0x1A626331: pi/2 - PIO2_1 */
+    PIO2_2 = 6.07710050630396597660e-11,                 /* 0x3DD0B461, 0x1A600000: second 33 bits */
+    PIO2_2T = 2.02226624879595063154e-21,                /* 0x3BA3198A, 0x2E037073 */
+    PIO2_3 = 2.02226624871116645580e-21,                 /* 0x3BA3198A, 0x2E000000: third 33 bits */
+    PIO2_3T = 8.47842766036889956997e-32;                /* 0x397B839A, 0x252049C1 */
+
+void trig_turn_to(struct trig_turn *turn, double quarters)
 {
-    static const double to_integer = 0x1.8p52, /* 1.5/DBL_EPSILON: adding it rounds to an integer */
-        invpio2 = 6.36619772367581382433e-01,  /* 0x3FE45F30, 0x6DC9C883: 53 bits of 2/pi */
-        pio2_1 = 1.57079632673412561417e+00,   /* 0x3FF921FB, 0x54400000: first 33 bits of pi/2 */
-        pio2_1t = 6.07710050650619224932e-11,  /* 0x3DD0B461, 0x1A626331: pi/2 - pio2_1 */
-        pio2_2 = 6.07710050630396597660e-11,   /* 0x3DD0B461, 0x1A600000: second 33 bits */
-        pio2_2t = 2.02226624879595063154e-21,  /* 0x3BA3198A, 0x2E037073 */
-        pio2_3 = 2.02226624871116645580e-21,   /* 0x3BA3198A, 0x2E000000: third 33 bits */
-        pio2_3t = 8.47842766036889956997e-32;  /* 0x397B839A, 0x252049C1 */
-    const double fn = x * invpio2 + to_integer - to_integer;
-    double r = x - fn * pio2_1, w = fn * pio2_1t, t; /* first round, good to 85 bits */
-    y[0] = r - w;
-    if (exponent_of(x) - exponent_of(y[0]) > 16) { /* second round, good to 118 bits */
-        t = r;
-        w = fn * pio2_2;
-        r = t - w;
-        w = fn * pio2_2t - ((t - r) - w);
-        y[0] = r - w;
-        if (exponent_of(x) - exponent_of(y[0]) > 49) { /* third round, good to 151 bits: covers all cases */
-            t = r;
-            w = fn * pio2_3;
-            r = t - w;
-            w = fn * pio2_3t - ((t - r) - w);
-            y[0] = r - w;
-        }
+    /* the high part is exact, as quarters has 20 bits; one round, good to 85 bits */
+    *turn = (struct trig_turn){quarters, quarters * PIO2_1, quarters * PIO2_1T, (int)quarters & 3};
+}
+
+struct trig_pair trig_near_multiple(double angle)
+{
+    const double quarters = angle * TRIG_INVPIO2 + TRIG_TO_INTEGER - TRIG_TO_INTEGER;
+    /* second round, good to 118 bits */
+    const double first = angle - quarters * PIO2_1;
+    double w = quarters * PIO2_2, r = first - w;
+    w = quarters * PIO2_2T - ((first - r) - w);
+    double y = r - w;
+    if (exponent_of(angle) - exponent_of(y) > 49) { /* third round, good to 151 bits: covers all cases */
+        const double second = r;
+        w = quarters * PIO2_3;
+        r = second - w;
+        w = quarters * PIO2_3T - ((second - r) - w);
+        y = r - w;
     }
-    y[1] = (r - y[0]) - w;
-    return (int)fn;
+    return trig_of_rest((int)quarters & 3, y, (r - y) - w);
 }
 
 /* 24 bits an element: the bits of 2/pi behind the binary point. */
@@ -272,11 +221,13 @@ static int reduce_parts(const double *x, double y[2], int e0, int nx)
     return n & 7;
 }
 
-static int reduce_large(double x, double y[2])
+struct trig_pair trig_large(double x)
 {
     const uint64_t bits = bits_of(x);
     const int exponent = exponent_of(x);
-    double parts[3], z = from_bits((bits & UINT64_MAX >> 12) | (uint64_t)(0x3ff + 23) << 52);
+    if (exponent == 0x7ff)
+        return (struct trig_pair){x - x, x - x};
+    double y[2], parts[3], z = from_bits((bits & UINT64_MAX >> 12) | (uint64_t)(0x3ff + 23) << 52);
     int i;
     for (i = 0; i < 2; i++) {
         parts[i] = (double)(int32_t)z;
@@ -286,33 +237,5 @@ static int reduce_large(double x, double y[2])
     while (parts[i] == 0.0) /* the first is not */
         i--;
     const int n = reduce_parts(parts, y, exponent - (0x3ff + 23), i + 1);
-    if (bits >> 63 == 0)
-        return n;
-    y[0] = -y[0];
-    y[1] = -y[1];
-    return -n;
-}
-
-void trig_sine_cosine(double angle, double *sine, double *cosine)
-{
-    const double size = angle < 0.0 ? -angle : angle;
-    double y[2];
-    int n;
-    if (size <= QUARTER) {
-        *sine = size < TINY ? angle : kernel_sine(angle, 0.0);
-        *cosine = kernel_cosine(angle, 0.0);
-        return;
-    }
-    if (size < LARGE) {
-        n = reduce_medium(angle, y);
-    } else if (exponent_of(angle) < 0x7ff) {
-        n = reduce_large(angle, y);
-    } else {
-        *sine = *cosine = angle - angle;
-        return;
-    }
-    const double s = kernel_sine(y[0], y[1]), c = kernel_cosine(y[0], y[1]);
-    const double first = n & 1 ? c : s, second = n & 1 ? s : c;
-    *sine = n & 2 ? -first : first;
-    *cosine = (n + 1) & 2 ? -second : second;
+    return bits >> 63 ? trig_of_rest(-n & 3, -y[0], -y[1]) : trig_of_rest(n & 3, y[0], y[1]);
 }

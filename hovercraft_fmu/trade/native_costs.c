@@ -1,0 +1,265 @@
+/* What an FMU costs a host in C: a line "name value" for each measure, medians of interleaved samples.
+
+   native_costs LIBRARY GUID RESOURCES [substeps]
+   With `substeps` also ns a sub-step of each method, beside the same arithmetic with this platform's libm at -O3: a
+   plain loop of semi-implicit Euler, and kernel.c (compiled into this program with HOVERCRAFT_LIBM). */
+
+#include <dlfcn.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "fmi2FunctionTypes.h"
+#include "kernel.h"
+#include "variables.h"
+
+enum { SAMPLES = 21, MOST_CASES = 16, SUBSTEPS = 20000, ALIVE = 100 };
+
+struct functions {
+    fmi2InstantiateTYPE *instantiate;
+    fmi2SetupExperimentTYPE *setup;
+    fmi2EnterInitializationModeTYPE *enter;
+    fmi2ExitInitializationModeTYPE *leave;
+    fmi2SetRealTYPE *set;
+    fmi2GetRealTYPE *get;
+    fmi2SetIntegerTYPE *choose;
+    fmi2DoStepTYPE *step;
+    fmi2ResetTYPE *reset;
+    fmi2FreeInstanceTYPE *release;
+};
+
+struct host {
+    struct functions f;
+    const char *guid, *resources;
+    fmi2Component craft;
+    double time; /* s, where the last step ended */
+};
+
+struct outcome_of_case {
+    char name[64];
+    double samples[SAMPLES];
+};
+
+static double now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+static void demand(int good, const char *what)
+{
+    if (!good) {
+        fprintf(stderr, "%s failed\n", what);
+        exit(1);
+    }
+}
+
+static long resident(void)
+{
+    long size, pages = -1;
+    FILE *file = fopen("/proc/self/statm", "r");
+    demand(file && fscanf(file, "%ld %ld", &size, &pages) == 2, "statm");
+    fclose(file);
+    return pages * sysconf(_SC_PAGESIZE);
+}
+
+static void *found(void *library, const char *name)
+{
+    void *function = dlsym(library, name);
+    demand(function != NULL, name);
+    return function;
+}
+
+static void load(struct host *host, const char *path)
+{
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    demand(library != NULL, "dlopen");
+    host->f = (struct functions){
+        (fmi2InstantiateTYPE *)found(library, "fmi2Instantiate"),
+        (fmi2SetupExperimentTYPE *)found(library, "fmi2SetupExperiment"),
+        (fmi2EnterInitializationModeTYPE *)found(library, "fmi2EnterInitializationMode"),
+        (fmi2ExitInitializationModeTYPE *)found(library, "fmi2ExitInitializationMode"),
+        (fmi2SetRealTYPE *)found(library, "fmi2SetReal"),
+        (fmi2GetRealTYPE *)found(library, "fmi2GetReal"),
+        (fmi2SetIntegerTYPE *)found(library, "fmi2SetInteger"),
+        (fmi2DoStepTYPE *)found(library, "fmi2DoStep"),
+        (fmi2ResetTYPE *)found(library, "fmi2Reset"),
+        (fmi2FreeInstanceTYPE *)found(library, "fmi2FreeInstance"),
+    };
+}
+
+static void logger(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
+                   fmi2String message, ...)
+{
+    (void)environment, (void)instance, (void)category;
+    if (status > fmi2Warning)
+        fprintf(stderr, "%s\n", message);
+}
+
+static fmi2Component made(const struct host *host)
+{
+    static const fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
+    fmi2Component craft = host->f.instantiate("craft", fmi2CoSimulation, host->guid, host->resources, &callbacks,
+                                              fmi2False, fmi2False);
+    demand(craft != NULL, "fmi2Instantiate");
+    return craft;
+}
+
+static void start(struct host *host, int method, double tolerance)
+{
+    static const unsigned reference = V_INTEGRATOR, of_tolerance = V_TOLERANCE;
+    const struct functions *f = &host->f;
+    demand(f->reset(host->craft) == fmi2OK && f->choose(host->craft, &reference, 1, &method) == fmi2OK &&
+               f->set(host->craft, &of_tolerance, 1, &tolerance) == fmi2OK &&
+               f->setup(host->craft, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK &&
+               f->enter(host->craft) == fmi2OK && f->leave(host->craft) == fmi2OK,
+           "initialization");
+    host->time = 0.0;
+}
+
+/* us a communication step: set, step, get. */
+static double time_of_calls(struct host *host, double size, int steps)
+{
+    static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER};
+    static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,            V_POSE_HEADING, V_VELOCITY_X, V_VELOCITY_Y,
+                                       V_VELOCITY_YAW_RATE, V_BODY_SURGE, V_BODY_SWAY,    V_SPEED};
+    const double controls[] = {5.0, 0.5, 0.2};
+    double values[9];
+    start(host, SEMI_IMPLICIT_EULER, 1e-6);
+    const double begun = now();
+    for (int i = 0; i < steps; i++) {
+        demand(host->f.set(host->craft, inputs, 3, controls) == fmi2OK &&
+                   host->f.step(host->craft, host->time, size, fmi2True) <= fmi2Warning &&
+                   host->f.get(host->craft, outputs, 9, values) == fmi2OK,
+               "a communication step");
+        host->time += size;
+    }
+    return (now() - begun) / steps * 1e6;
+}
+
+/* ns a sub-step, inside one communication step. */
+static double time_of_substeps(struct host *host, int method)
+{
+    static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER};
+    const double controls[] = {5.0, 0.5, 0.2};
+    start(host, method, 1e-12);
+    demand(host->f.set(host->craft, inputs, 3, controls) == fmi2OK, "fmi2SetReal");
+    const double begun = now();
+    demand(host->f.step(host->craft, 0.0, SUBSTEPS * 0.001, fmi2True) <= fmi2Warning, "fmi2DoStep");
+    return (now() - begun) / SUBSTEPS * 1e9;
+}
+
+/* What it is measured against; `sink` keeps the compiler from leaving it out. */
+static volatile double sink;
+
+static double time_of_kernel_with_libm(int method)
+{
+    const struct craft craft = {100.0, 500.0, 20.0, 10.0, 5.0, 1.25, 1.225, -0.25, 3.0, 0.0, 10.0};
+    const struct drive drive = {.start = {5.0, 0.5, 0.2}};
+    const struct settings settings = {0.001, method, 1e-12};
+    const struct state rest = {.x = 0.0};
+    struct stretch stretch;
+    const double begun = now();
+    demand(kernel_advance(&rest, &drive, &craft, SUBSTEPS * 0.001, &settings, 0.0, &stretch) == ADVANCED, "kernel");
+    sink = stretch.state.x;
+    return (now() - begun) / SUBSTEPS * 1e9;
+}
+
+static double time_of_plain_loop(void)
+{
+    const double mass = 100.0, inertia = 500.0, k = 0.5 * 1.225 * 75.0 * 1.25, x_d = -5.0, h = 0.001;
+    const double thrust = 5.0, side = 3.0 * (0.5 - 0.2), turn = 30.0 * (0.5 - 0.2);
+    double x = 0.0, y = 0.0, heading = 0.0, vx = 0.0, vy = 0.0, yaw_rate = 0.0;
+    const double begun = now();
+    for (int i = 0; i < SUBSTEPS; i++) {
+        const double c = cos(heading), s = sin(heading);
+        const double u = c * vx + s * vy, w = c * vy - s * vx + yaw_rate * x_d;
+        const double kq = k * sqrt(u * u + w * w), drag_y = -kq * w;
+        const double force_x = thrust - kq * u, force_y = drag_y + side;
+        vx += h * ((c * force_x - s * force_y) / mass);
+        vy += h * ((s * force_x + c * force_y) / mass);
+        x += h * vx;
+        y += h * vy;
+        yaw_rate += h * ((x_d * drag_y + turn) / inertia);
+        heading += h * yaw_rate;
+    }
+    sink = x + y;
+    return (now() - begun) / SUBSTEPS * 1e9;
+}
+
+static int compared(const void *a, const void *b)
+{
+    const double p = *(const double *)a, q = *(const double *)b;
+    return (p > q) - (p < q);
+}
+
+static double median(double *samples)
+{
+    qsort(samples, SAMPLES, sizeof *samples, compared);
+    return samples[SAMPLES / 2];
+}
+
+static void measure(struct host *host, bool with_substeps)
+{
+    static struct outcome_of_case cases[MOST_CASES];
+    static const double sizes[] = {0.01, 0.1, 1.0};
+    static const int steps[] = {100, 20, 4};
+    int n = 0;
+    for (int k = 0; k < SAMPLES; k++) {
+        n = 0;
+        for (int i = 0; i < 3; i++, n++) {
+            snprintf(cases[n].name, sizeof cases[n].name, "calls_%g", sizes[i]);
+            cases[n].samples[k] = time_of_calls(host, sizes[i], steps[i]);
+        }
+        for (int method = 1; with_substeps && method <= ADAPTIVE; method++, n += 2) {
+            snprintf(cases[n].name, sizeof cases[n].name, "substep_%s", METHODS[method - 1].name);
+            cases[n].samples[k] = time_of_substeps(host, method);
+            snprintf(cases[n + 1].name, sizeof cases[n].name, "libm_%s", METHODS[method - 1].name);
+            cases[n + 1].samples[k] = time_of_kernel_with_libm(method);
+        }
+        if (with_substeps) {
+            strcpy(cases[n].name, "plain_semi_implicit_euler");
+            cases[n++].samples[k] = time_of_plain_loop();
+        }
+    }
+    for (int i = 0; i < n; i++)
+        printf("%s %.9g\n", cases[i].name, median(cases[i].samples));
+}
+
+/* us to instantiate and free, bytes an instance. */
+static void measure_instances(const struct host *host)
+{
+    static fmi2Component alive[ALIVE];
+    double samples[SAMPLES];
+    for (int k = 0; k < SAMPLES; k++) {
+        const double begun = now();
+        host->f.release(made(host));
+        samples[k] = (now() - begun) * 1e6;
+    }
+    const long before = resident();
+    for (int i = 0; i < ALIVE; i++)
+        alive[i] = made(host);
+    printf("memory %.9g\n", (double)(resident() - before) / ALIVE);
+    for (int i = 0; i < ALIVE; i++)
+        host->f.release(alive[i]);
+    printf("instantiate %.9g\n", median(samples));
+}
+
+int main(int argc, char **argv)
+{
+    struct host host = {.guid = argc > 2 ? argv[2] : "", .resources = argc > 3 ? argv[3] : ""};
+    if (argc < 4)
+        return 1;
+    const double begun = now();
+    load(&host, argv[1]);
+    host.craft = made(&host);
+    printf("load %.9g\n", (now() - begun) * 1e6);
+    measure(&host, argc > 4);
+    host.f.release(host.craft);
+    measure_instances(&host);
+    return 0;
+}
