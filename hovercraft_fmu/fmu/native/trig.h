@@ -42,6 +42,7 @@ void trig_turn_to(struct trig_turn *turn, double quarters);
 struct trig_pair trig_near_multiple(double angle);
 struct trig_pair trig_large(double angle);
 
+static const double TRIG_QUARTER = 0x1.921fb54442d18p-1;    /* pi/4 */
 static const double TRIG_LARGE = 0x1.921fbp+20;            /* 2^20*pi/2, above it all bits of 2/pi count */
 static const double TRIG_TO_INTEGER = 0x1.8p52;            /* adding and subtracting it rounds to an integer */
 static const double TRIG_INVPIO2 = 6.36619772367581382433e-01; /* 0x3FE45F30, 0x6DC9C883: 53 bits of 2/pi */
@@ -78,6 +79,8 @@ static inline struct trig_pair trig_of_rest(int n, double y, double tail)
 static inline struct trig_pair trig_sine_cosine(double angle, struct trig_turn *turn)
 {
     const double size = fabs(angle);
+    if (size <= TRIG_QUARTER)
+        return trig_of_rest(0, angle, 0.0);
     if (!(size < TRIG_LARGE))
         return trig_large(angle);
     const double quarters = angle * TRIG_INVPIO2 + TRIG_TO_INTEGER - TRIG_TO_INTEGER;
