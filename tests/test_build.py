@@ -12,6 +12,8 @@ from tests.conftest import ROOT, Fresh
 
 BUILD = "import sys, os; os.umask(int(sys.argv[1], 8)); import hovercraft_fmu as h; print(h.build_fmu(), h.__file__)"
 
+BUILD_NATIVE = "from hovercraft_fmu.fmu.native_package import build_native_fmu; build_native_fmu()"
+
 
 def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
@@ -23,7 +25,7 @@ def test_the_same_bytes_elsewhere(fmu: Path, fresh: Fresh, tmp_path: Path, umask
     assert digest(tmp_path / "build" / "Hovercraft.fmu") == digest(fmu)
 
 
-def test_the_same_bytes_from_an_installed_wheel(fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
+def test_the_same_bytes_from_an_installed_wheel(fmu: Path, native_fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
     wheels, installed = tmp_path / "wheels", tmp_path / "installed"
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
     build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(wheels), str(ROOT)]
@@ -33,6 +35,8 @@ def test_the_same_bytes_from_an_installed_wheel(fmu: Path, fresh: Fresh, tmp_pat
     printed = fresh(BUILD, "022", env={"PYTHONPATH": str(installed)})
     assert printed.split()[1].startswith(str(installed))
     assert digest(tmp_path / "build" / "Hovercraft.fmu") == digest(fmu)
+    fresh(BUILD_NATIVE, env={"PYTHONPATH": str(installed)})
+    assert digest(tmp_path / "build" / "HovercraftNative.fmu") == digest(native_fmu)
 
 
 def test_a_build_leaves_the_process_as_it_was(tmp_path: Path) -> None:

@@ -147,6 +147,35 @@ def test_a_fault_is_loud_and_loses_nothing(name: str, instance: Any, messages: l
     assert after == before
 
 
+# pythonfmu takes a large value reference for a negative number
+@pytest.mark.parametrize("name", [name for name in FAULTS if name != "no such real, large"])
+def test_both_flavours_say_the_same(name: str, fmu: Path, native_fmu: Path) -> None:
+    said = []
+    for each in (fmu, native_fmu):
+        with one(each) as (instance, messages):
+            start(instance)
+            put(instance, thrust=7.0, port_thruster=0.5)
+            instance.doStep(0.0, 0.1)
+            with pytest.raises(FMICallException):
+                FAULTS[name][0](instance)
+            said.append(messages)
+    assert said[0] == said[1]
+    assert len(said[0]) == 1
+
+
+@pytest.mark.parametrize("values", [{"velocity__x": 123.456}, {"velocity__yaw_rate": 20.0, "drag_coefficient": 1e-3}])
+def test_both_flavours_warn_in_the_same_words(values: dict[str, float], fmu: Path, native_fmu: Path) -> None:
+    said = []
+    for each in (fmu, native_fmu):
+        with one(each) as (instance, messages):
+            put(instance, step_size=0.03, thrust=11.1, **values)
+            start(instance)
+            instance.doStep(0.0, 0.03)
+            said.append(messages)
+    assert said[0] == said[1]
+    assert len(said[0]) == 2
+
+
 @pytest.mark.parametrize(
     ("calls", "message"),
     [

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import schedule
+from hovercraft_fmu.trade import native_costs
 from hovercraft_fmu.trade.reference import reference_end
 from hovercraft_fmu.trade.rows import Setting
 from hovercraft_fmu.trade.work_precision import (
@@ -89,11 +91,26 @@ def test_the_command(tmp_path: Path) -> None:
     assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in advice)
     assert all(float(row["fmu_cost"]) > 0.0 < float(row["bare_cost"]) for row in rows)
     assert all((tmp_path / name).stat().st_size > 10000 for name in ("work_precision.png", "holding.png"))
+    if not native_costs.missing():
+        costs, before = (records(folder / "native.csv") for folder in (tmp_path, RESULTS))
+        assert [row["what"] for row in costs] == [row["what"] for row in before]
+        assert all(float(row["native"]) > 0.0 < float(row["other"]) for row in costs)
     # what is committed was written by the same command, and tells the same of the errors
     for ours, committed in zip(advice, records(RESULTS / "advice.csv"), strict=True):
         assert float(committed["position_error"]) <= float(committed["accuracy_m"])
         assert ours.keys() == committed.keys()
 
 
-def test_the_readme_shows_the_committed_advice() -> None:
-    assert (RESULTS / "advice.md").read_text(encoding="utf-8") in (ROOT / "README.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["advice.md", "native.md"])
+def test_the_readme_shows_what_is_committed(name: str) -> None:
+    assert (RESULTS / name).read_text(encoding="utf-8") in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_what_the_native_fmu_costs_is_said_where_it_cannot_be_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(native_costs, "compiler", lambda: None)
+    shown = Console(record=True)
+    shown.print(native_costs.run(tmp_path))
+    assert "not measured: no C compiler" in shown.export_text()
+    assert list(tmp_path.iterdir()) == []

@@ -28,7 +28,7 @@ FMI_HEADERS = tuple(
 """The standard's own, with their licence in them."""
 OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
 """What keeps the bits, and keeps libm out."""
-LIBRARY = ("-g0", "-shared", "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror")
+LIBRARY = ("-g0", "-shared", "-fPIC", "-fvisibility=hidden")
 
 
 @dataclass(frozen=True)

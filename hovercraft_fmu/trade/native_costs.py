@@ -22,6 +22,7 @@ from ..fmu.package import build_fmu
 from ..hosts import compiler, python_library
 from ..model.integrators import INTEGRATORS
 from ..simulation import instantiated, read_description
+from ..view.tables import markdown
 
 COMMUNICATION_STEPS = (0.01, 0.1, 1.0)
 """s"""
@@ -90,7 +91,7 @@ def _instances(native: Mapping[str, float], python: Mapping[str, float]) -> list
     rows = (
         ("load, first instance", "load", "us"),
         ("instantiate, free", "instantiate", "us"),
-        ("memory of an instance", "memory", "B"),
+        ("memory of an instance", "memory", "bytes"),
     )
     return [Cost(what, unit, native[key], "Python FMU", python[key]) for what, key, unit in rows]
 
@@ -175,7 +176,7 @@ def _started(instance: Any) -> Callable[[float], float]:
 
 
 def run(folder: Path) -> Group:
-    """Measure, write native.csv into the folder, and return what is to be printed."""
+    """Measure, write native.csv and native.md into the folder, and return what is to be printed."""
     if why := missing():
         return Group(f"\nThe native FMU was not measured: {why}")
     costs = measure()
@@ -184,15 +185,18 @@ def run(folder: Path) -> Group:
         writer = csv.writer(file)
         writer.writerow([*Cost._fields, "ratio"])
         writer.writerows([*cost, cost.ratio] for cost in costs)
-    return Group(f"\nWhat {NATIVE.identifier} costs", _table(costs))
-
-
-def _table(costs: list[Cost]) -> Table:
+    (folder / "native.md").write_text(markdown(TITLES, map(_cells, costs)) + "\n", encoding="utf-8")
     table = Table(box=None, pad_edge=False)
-    for title in ("what", "unit", "native", "compared with", "that", "ratio"):
+    for title in TITLES:
         table.add_column(title)
     for cost in costs:
-        table.add_row(
-            cost.what, cost.unit, f"{cost.native:.3g}", cost.compared_with, f"{cost.other:.3g}", f"{cost.ratio:.3g} x"
-        )
-    return table
+        table.add_row(*_cells(cost))
+    return Group(f"\nWhat {NATIVE.identifier} costs", table)
+
+
+TITLES = ("what", "native", "compared with", "that", "ratio")
+
+
+def _cells(cost: Cost) -> tuple[str, ...]:
+    native, other = (f"{value:.3g} {cost.unit}" for value in (cost.native, cost.other))
+    return cost.what, native, cost.compared_with, other, f"{cost.ratio:.2g} x"
