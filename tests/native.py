@@ -18,7 +18,7 @@ from hovercraft_fmu.model.subcycling import Settings
 
 C_TESTS = Path(__file__).parent / "c"
 OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
-NO_RAMP = Controls(0.0, 0.0, 0.0)
+NO_RAMP = Controls(0.0)
 
 
 def c_compiler() -> str:
@@ -46,7 +46,7 @@ def compile_c(output: Path, files: Iterable[Path | str], *options: str) -> Path:
 
 
 class CCraft(Structure):
-    _fields_ = [(field.name, c_double) for field in fields(Craft)]
+    _fields_ = [(field.name, c_int32 if field.name == "drag_area" else c_double) for field in fields(Craft)]
 
 
 class CState(Structure):
@@ -91,7 +91,7 @@ class Kernel:
         self.library: Any = CDLL(str(library))
         self.library.kernel_loads_on.restype = CLoads
         self.library.kernel_stability_number.restype = c_double
-        self.library.kernel_stability_number.argtypes = (c_double, POINTER(CCraft))
+        self.library.kernel_stability_number.argtypes = (c_double, c_double, POINTER(CCraft))
 
     def advance(
         self,
@@ -119,8 +119,8 @@ class Kernel:
         arguments = byref(CState(*state)), byref(CControls(*controls)), byref(CCraft(*astuple(craft)))
         return numbers_of(self.library.kernel_loads_on(*arguments), ("x", "y", "moment", "kq"))
 
-    def stability_number(self, drag: float, craft: Craft) -> float:
-        return float(self.library.kernel_stability_number(drag, byref(CCraft(*astuple(craft)))))
+    def stability_number(self, drag: float, rotation: float, craft: Craft) -> float:
+        return float(self.library.kernel_stability_number(drag, rotation, byref(CCraft(*astuple(craft)))))
 
 
 class Text:

@@ -41,11 +41,11 @@ def runs() -> dict[str, Run]:
 def runs_header() -> str:
     """The runs as tables of C."""
     lines = ["struct run { const char *name; unsigned references[20]; double values[20]; unsigned starts; int method;"]
-    lines += ["             const double (*rows)[5]; unsigned steps; };"]
+    lines += ["             const double (*rows)[2 + INPUT_COUNT]; unsigned steps; };"]
     table = []
     for name, run in runs().items():
         rows = [(time, end - time, *held) for time, end, held in schedule(run)]
-        lines += [f"static const double {name}[][5] = {{", *(f"    {_braced(map(repr, row))}," for row in rows), "};"]
+        lines += [f"static const double {name}[][2 + INPUT_COUNT] = {{", *(f"    {_braced(map(repr, row))}," for row in rows), "};"]
         values = {key: value for key, value in run.start_values.items() if key != "integrator"}
         references = _braced(constant(key) for key in values)
         numbers = _braced(repr(float(value)) for value in values.values())

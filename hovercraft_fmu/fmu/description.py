@@ -73,7 +73,7 @@ NATIVE = Flavour(
         }
     ),
     categories=MappingProxyType(LOG_CATEGORIES),
-    sources=("fmi2.c", "instance.c", "kernel.c", "memory.c", "serialize.c", "text.c", "trig.c"),
+    sources=("fmi2.c", "instance.c", "kernel.c", "logarithm.c", "memory.c", "serialize.c", "text.c", "trig.c"),
 )
 
 

@@ -1,6 +1,7 @@
 """variables.h: the table of variables, and what else C and Python must share, for the C compiler."""
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import fields
 
@@ -11,6 +12,7 @@ from .interface import (
     ACTION,
     COUNTER_STOPPED,
     CRAFT_PARAMETERS,
+    ENUMERATIONS,
     INPUT_HELD,
     INPUTS,
     MOTION,
@@ -21,6 +23,7 @@ from .interface import (
     VARIABLES,
     WARNINGS,
     WATCHED,
+    Enumeration,
     Variable,
 )
 from .slave import HELD, SAME_TIME, SETTABLE, Phase
@@ -49,7 +52,7 @@ enum {{ {counts} }};
 enum {{ SUBSTEPS_MAX = {substeps_max} }};
 enum {{ {warnings} }};
 #define COUNTER_STOPPED_TEXT {counter_text}
-#define INTEGRATOR_LIST {integrator_list}
+{lists}
 #define HELD {held}
 #define SAME_TIME {same_time}
 
@@ -96,8 +99,15 @@ static const unsigned WATCHED[] = {{{watched}}};
 
 #endif
 """
-OF_A_KIND = {"step_size": "STEP_SIZE_RULE", "tolerance": "TOLERANCE_RULE", "integrator": "INTEGRATOR_RULE"}
-RULES = ("ANY", "POSITIVE", "NOT_NEGATIVE", "FRACTION", *OF_A_KIND.values())
+OF_A_KIND = {
+    "drag_center_fraction": "FRACTION",
+    "rotational_drag": "SHARE",
+    "step_size": "STEP_SIZE_RULE",
+    "tolerance": "TOLERANCE_RULE",
+    "integrator": "INTEGRATOR_RULE",
+    "drag_area": "DRAG_AREA_RULE",
+}
+RULES = ("ANY", "POSITIVE", "NOT_NEGATIVE", *OF_A_KIND.values())
 
 
 def variables_header(build: str) -> str:
@@ -109,7 +119,6 @@ def variables_header(build: str) -> str:
         "STEP_TURNS": STEP_TURNS,
     }
     counts = {"INPUT_COUNT": len(INPUTS), "STATE_COUNT": len(STATES), "CRAFT_COUNT": len(CRAFT_PARAMETERS)}
-    known = ", ".join(f"{i} ({method.name})" for i, method in enumerate(INTEGRATORS, 1))
     return HEADER.format(
         build=build,
         guid=guid(build),
@@ -118,7 +127,7 @@ def variables_header(build: str) -> str:
         substeps_max=SUBSTEPS_MAX,
         warnings=_assigned(warnings),
         counter_text=_quoted(WARNINGS[COUNTER_STOPPED]),
-        integrator_list=_quoted(known),
+        lists="\n".join(_list(each) for each in ENUMERATIONS),
         held=repr(HELD),
         same_time=repr(SAME_TIME),
         phases=", ".join(phase.name for phase in Phase),
@@ -164,9 +173,14 @@ def _rule(name: str) -> str:
         return "POSITIVE"
     if name in NOT_NEGATIVE:
         return "NOT_NEGATIVE"
-    if name == "drag_center_fraction":
-        return "FRACTION"
     return OF_A_KIND.get(name, "ANY")
+
+
+def _list(enumeration: Enumeration) -> str:
+    """How many items it has, and how a message lists them."""
+    name = re.sub("(?<=[a-z])(?=[A-Z])", "_", enumeration.type_name).upper()
+    known = ", ".join(f"{i} ({item})" for i, (item, _) in enumerate(enumeration.items, 1))
+    return f"#define {name}_COUNT {len(enumeration.items)}\n#define {name}_LIST {_quoted(known)}"
 
 
 def _assigned(values: dict[str, int]) -> str:

@@ -104,7 +104,7 @@ def _archive() -> bytes:
 
 
 def _sun_notice() -> bytes:
-    """The notice of the sine and cosine, which their source carries."""
+    """The notice of sine, cosine and logarithm, which their sources carry."""
     text = (C_FOLDER / "trig.h").read_text(encoding="utf-8")
     lines = text[text.index("   ====") : text.index("   The reduction of medium")].splitlines()
     return "".join(line.removeprefix("   ") + "\n" for line in lines).encode()

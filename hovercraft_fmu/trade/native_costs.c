@@ -158,7 +158,7 @@ static volatile double sink;
 
 static double time_of_kernel_with_libm(int method)
 {
-    const struct craft craft = {100.0, 500.0, 20.0, 10.0, 5.0, 1.25, 1.225, -0.25, 3.0, 0.0, 10.0};
+    const struct craft craft = {100.0, 500.0, 20.0, 10.0, 5.0, 1.25, 1.225, -0.25, 3.0, 0.0, 10.0, CONSTANT, 0.0, 9.80665, 0.0};
     const struct drive drive = {.start = {5.0, 0.5, 0.2}};
     const struct settings settings = {0.001, method, 1e-12};
     const struct state rest = {.x = 0.0};

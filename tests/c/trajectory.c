@@ -92,7 +92,7 @@ struct functions {
 /* The hash of one run, or 0 where a call failed. */
 static unsigned long long hash_of_run(const struct functions *f, const struct run *run)
 {
-    static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER}, method = V_INTEGRATOR;
+    static const unsigned method = V_INTEGRATOR;
     static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,     V_POSE_HEADING, V_VELOCITY_X,     V_VELOCITY_Y,
                                        V_VELOCITY_YAW_RATE,        V_BODY_SURGE,   V_BODY_SWAY,      V_SPEED,
                                        V_FORCE_X,    V_FORCE_Y,    V_MOMENT,       V_STABILITY_NUMBER};
@@ -107,7 +107,7 @@ static unsigned long long hash_of_run(const struct functions *f, const struct ru
         return 0;
     for (unsigned i = 0; i < run->steps; i++) {
         const double *row = run->rows[i]; /* time, step, controls */
-        if (f->set(craft, inputs, 3, row + 2) != fmi2OK || f->step(craft, row[0], row[1], fmi2True) > fmi2Warning ||
+        if (f->set(craft, INPUTS, INPUT_COUNT, row + 2) != fmi2OK || f->step(craft, row[0], row[1], fmi2True) > fmi2Warning ||
             f->get(craft, outputs, OUTPUTS, values) != fmi2OK)
             return 0;
         hash = hash_of(hash, values, OUTPUTS);

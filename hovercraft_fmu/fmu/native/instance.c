@@ -91,9 +91,15 @@ enum verdict instance_initialize(struct instance *instance, const char *call)
 /* The craft that the parameters make. */
 static enum verdict make_craft(struct instance *instance, struct craft *craft)
 {
-    const double *reals = instance->now.reals;
-    for (unsigned i = 0; i < CRAFT_COUNT; i++)
-        *(double *)((char *)craft + CRAFT_FIELDS[i].offset) = reals[CRAFT_FIELDS[i].reference];
+    const struct content *now = &instance->now;
+    for (unsigned i = 0; i < CRAFT_COUNT; i++) {
+        const unsigned reference = CRAFT_FIELDS[i].reference;
+        char *field = (char *)craft + CRAFT_FIELDS[i].offset;
+        if (VARIABLES[reference].kind == REAL)
+            *(double *)(void *)field = now->reals[reference];
+        else
+            *(int32_t *)(void *)field = now->integers[reference];
+    }
     if (craft->thrust_max - craft->thrust_min < 0.0)
         return instance_say(instance, REFUSED, "thrust_min = %r N: must not be above thrust_max = %r N",
                             craft->thrust_min, craft->thrust_max);
@@ -102,7 +108,8 @@ static enum verdict make_craft(struct instance *instance, struct craft *craft)
 
 static struct controls inputs_of(const double *reals)
 {
-    return (struct controls){reals[V_THRUST], reals[V_PORT_THRUSTER], reals[V_STARBOARD_THRUSTER]};
+    return (struct controls){reals[V_THRUST], reals[V_PORT_THRUSTER], reals[V_STARBOARD_THRUSTER], reals[V_WIND_X],
+                             reals[V_WIND_Y]};
 }
 
 static void get_state(const double *reals, struct state *state)
@@ -210,7 +217,7 @@ static enum verdict warn_of_the_step(struct instance *instance)
 {
     const struct content *now = &instance->now;
     const struct method *method = method_of(instance);
-    const double number = kernel_stability_number(now->drag, &now->craft), rotation = now->rotation;
+    const double number = now->stability, rotation = now->rotation;
     enum verdict verdict = FINE;
     if (number > method->stability_limit && is_first(instance, STEP_UNSTABLE))
         verdict = instance_say(instance, WARNED,
@@ -233,7 +240,7 @@ static enum verdict warn_of_held_inputs(struct instance *instance, const struct 
     const double values[] = {controls->thrust, controls->port, controls->starboard};
     const double held[] = {limits.thrust, limits.port, limits.starboard};
     enum verdict verdict = FINE;
-    for (unsigned i = 0; i < INPUT_COUNT; i++)
+    for (unsigned i = 0; i < sizeof held / sizeof *held; i++)
         if (fabs(values[i] - held[i]) > HELD * larger(1.0, fabs(held[i])) && is_first(instance, INPUT_HELD))
             verdict = instance_say(instance, WARNED, "%s = %r: is outside its limits and is held at %r (said once)",
                                    VARIABLES[INPUTS[i]].name, values[i], held[i]);
@@ -261,15 +268,17 @@ static enum verdict worse(enum verdict a, enum verdict b)
 
 static bool is_finite_drive(const struct controls *c)
 {
-    return isfinite(c->thrust) && isfinite(c->port) && isfinite(c->starboard);
+    return isfinite(c->thrust) && isfinite(c->port) && isfinite(c->starboard) && isfinite(c->wind_x) &&
+           isfinite(c->wind_y);
 }
 
 /* The inputs over the step. Refused: a ramp that leaves the range of numbers. */
 static enum verdict make_drive(struct instance *instance, double step, struct drive *drive, struct controls *end)
 {
     const double *rates = instance->now.rates;
-    *drive = (struct drive){inputs_of(instance->now.reals), {rates[0], rates[1], rates[2]}, false};
-    drive->ramped = rates[0] != 0.0 || rates[1] != 0.0 || rates[2] != 0.0;
+    *drive = (struct drive){inputs_of(instance->now.reals), {rates[0], rates[1], rates[2], rates[3], rates[4]}, false};
+    for (unsigned i = 0; i < INPUT_COUNT; i++)
+        drive->ramped = drive->ramped || rates[i] != 0.0;
     *end = kernel_controls_at(drive, step);
     if (is_finite_drive(end))
         return FINE;
@@ -300,11 +309,13 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->tuned = false;
     now->time = point + step;
     now->moved = now->acted = true;
-    now->drag = larger(now->drag, stretch.drag);
+    now->stability = larger(now->stability, kernel_stability_number(stretch.drag, stretch.rotation, &craft));
     now->rotation = larger(now->rotation, stretch.rotation);
     now->reals[V_THRUST] = end.thrust; /* a ramp goes on from here */
     now->reals[V_PORT_THRUSTER] = end.port;
     now->reals[V_STARBOARD_THRUSTER] = end.starboard;
+    now->reals[V_WIND_X] = end.wind_x;
+    now->reals[V_WIND_Y] = end.wind_y;
     enum verdict verdict = count_substeps(instance, stretch.substeps);
     verdict = worse(verdict, warn_of_the_step(instance));
     verdict = worse(verdict, warn_of_held_inputs(instance, &drive.start));
@@ -369,7 +380,7 @@ static enum verdict observe_action(struct instance *instance)
     reals[V_ACCELERATION_YAW] = loads.moment / now->craft.inertia;
     reals[V_APPLIED_THRUST] = kernel_saturate(&now->controls, &now->craft).thrust;
     reals[V_APPLIED_STEERING] = kernel_steering(&now->controls, &now->craft);
-    reals[V_STABILITY_NUMBER] = kernel_stability_number(now->drag, &now->craft);
+    reals[V_STABILITY_NUMBER] = now->stability;
     reals[V_ROTATION_PER_SUBSTEP] = now->rotation;
     if (check_finite(instance, ACTION, sizeof ACTION / sizeof *ACTION) == REFUSED)
         return REFUSED;
@@ -437,9 +448,12 @@ static const char *broken_rule(enum rule rule, double value)
     case STEP_SIZE_RULE:
     case TOLERANCE_RULE:
         return value > 0.0 ? NULL : "must be a finite number greater than 0";
+    case SHARE:
+        return 0.0 <= value && value <= 1.0 ? NULL : "must be from 0 (off) to 1 (the whole moment)";
     case INTEGRATOR_RULE:
-        return 1.0 <= value && value <= (double)(sizeof METHODS / sizeof *METHODS) ? NULL
-                                                                                   : "must be one of " INTEGRATOR_LIST;
+        return 1.0 <= value && value <= INTEGRATOR_COUNT ? NULL : "must be one of " INTEGRATOR_LIST;
+    case DRAG_AREA_RULE:
+        return 1.0 <= value && value <= DRAG_AREA_COUNT ? NULL : "must be one of " DRAG_AREA_LIST;
     case ANY:
         break;
     }

@@ -31,7 +31,7 @@ struct content {
     struct craft craft;               /* of the last step */
     struct settings settings;
     double proposed;                  /* s, the next step of the adaptive method */
-    double drag, rotation;            /* kg, rad: the largest of a sub-step so far */
+    double stability, rotation;       /* 1, rad: the largest of a sub-step so far */
     bool tuned;                       /* a parameter was set since the last step: the next one takes it up */
     bool moved;                       /* the motion in `reals` is not yet that of the communication point */
     bool acted;                       /* nor is what acts on the craft */

@@ -2,10 +2,13 @@
 
 #include <math.h>
 
+#include "logarithm.h"
 #include "trig.h"
 
 static const double MIN_STEP = 1e-12;     /* s: below it the adaptive method gives up */
 static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
+static const double NEAR_REST = 4.0;      /* sub-steps in which friction could stop the craft */
+static const double LEAST_SLIP = 1e-150;  /* m/s: so that at rest nothing is divided by zero */
 static const double WHOLE = 1e-9;         /* relative: this close to a whole number of sub-steps is that number */
 static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds what is smaller, ties to even */
 
@@ -18,11 +21,21 @@ static inline struct trig_pair sine_cosine(double angle, struct trig_turn *turn)
     return (struct trig_pair){sin(angle), cos(angle)};
 }
 
+static double natural_logarithm(double x)
+{
+    return log(x);
+}
+
 #else
 
 static inline struct trig_pair sine_cosine(double angle, struct trig_turn *turn)
 {
     return trig_sine_cosine(angle, turn);
+}
+
+static double natural_logarithm(double x)
+{
+    return logarithm_of(x);
 }
 
 #endif
@@ -43,6 +56,38 @@ double kernel_projected_area(const struct craft *craft)
 static double drag_factor(const struct craft *craft)
 {
     return 0.5 * craft->air_density * kernel_projected_area(craft) * craft->drag_coefficient;
+}
+
+static double drag_factor_ahead(const struct craft *craft)
+{
+    return 0.5 * craft->air_density * (craft->width * craft->height) * craft->drag_coefficient;
+}
+
+static double drag_factor_abeam(const struct craft *craft)
+{
+    return 0.5 * craft->air_density * (craft->length * craft->height) * craft->drag_coefficient;
+}
+
+static double spin_drag_factor(const struct craft *craft)
+{
+    const double square = craft->length * craft->length;
+    const double whole = craft->air_density * craft->drag_coefficient * craft->height * (square * square) / 64.0;
+    return craft->rotational_drag * whole;
+}
+
+static double friction_force(const struct craft *craft)
+{
+    return craft->skirt_friction * craft->mass * craft->gravity;
+}
+
+static bool has_plain_drag(const struct craft *craft)
+{
+    return craft->drag_area == CONSTANT && craft->rotational_drag == 0.0;
+}
+
+static bool rubs(const struct craft *craft)
+{
+    return craft->skirt_friction != 0.0;
 }
 
 static double drag_center(const struct craft *craft)
@@ -68,6 +113,8 @@ struct controls kernel_saturate(const struct controls *controls, const struct cr
         clip(controls->thrust, craft->thrust_min, craft->thrust_max),
         clip(controls->port, 0.0, 1.0),
         clip(controls->starboard, 0.0, 1.0),
+        controls->wind_x,
+        controls->wind_y,
     };
 }
 
@@ -85,13 +132,30 @@ struct controls kernel_controls_at(const struct drive *drive, double time)
         drive->start.thrust + time * drive->rate.thrust,
         drive->start.port + time * drive->rate.port,
         drive->start.starboard + time * drive->rate.starboard,
+        drive->start.wind_x + time * drive->rate.wind_x,
+        drive->start.wind_y + time * drive->rate.wind_y,
     };
 }
 
+/* Whether the air moves, now or later in the step. */
+static bool is_windy(const struct drive *drive)
+{
+    const struct controls *start = &drive->start, *rate = &drive->rate;
+    return start->wind_x != 0.0 || start->wind_y != 0.0 || rate->wind_x != 0.0 || rate->wind_y != 0.0;
+}
+
+enum drag_kind { WITHOUT_DRAG, PLAIN_DRAG, ANY_DRAG };
+
 /* All that the loads need and that does not change from sub-step to sub-step; `steer` renews the controls' part. */
 struct load_function {
-    double k, x_d;
+    enum drag_kind kind;
+    bool slides; /* friction is one of the loads */
+    bool directional;
+    double k, ahead, abeam, spin, x_d;
+    double force, radius;      /* N, m: of friction */
     double thrust, side, turn; /* N, N, N.m */
+    double wind_x, wind_y;     /* m/s */
+    double begun;              /* s: where in the communication step its time 0 is */
     const struct craft *craft;
     const struct drive *drive;
     struct trig_turn last; /* of the heading */
@@ -103,42 +167,173 @@ static void steer(struct load_function *f, const struct controls *controls)
     f->thrust = held.thrust;
     f->side = f->craft->steering_force * (held.port - held.starboard);
     f->turn = thruster_moment(f->craft) * (held.port - held.starboard);
+    f->wind_x = held.wind_x;
+    f->wind_y = held.wind_y;
 }
 
-/* The controls at a time [s] after the start of the communication step. */
+/* The controls at a time [s] after the start. */
 static inline void steer_at(struct load_function *f, double time)
 {
     if (f->drive->ramped) {
-        const struct controls controls = kernel_controls_at(f->drive, time);
+        const struct controls controls = kernel_controls_at(f->drive, f->begun + time);
         steer(f, &controls);
     }
 }
 
+/* m: the mean distance of the points of the skirt's rectangle from its centre. */
+static double friction_radius(const struct craft *craft)
+{
+    const double length = craft->length, width = craft->width;
+    const double d = sqrt(length * length + width * width);
+    const double along = length * length / width * natural_logarithm((width + d) / length);
+    const double across = width * width / length * natural_logarithm((length + d) / width);
+    return d / 6.0 + (along + across) / 12.0;
+}
+
+/* The loads on the craft, but for the friction of its skirt. */
 static struct load_function load_function(const struct drive *drive, const struct craft *craft)
 {
     struct load_function f = {.k = drag_factor(craft), .x_d = drag_center(craft), .craft = craft, .drive = drive};
+    f.kind = f.k == 0.0 ? WITHOUT_DRAG : has_plain_drag(craft) && !is_windy(drive) ? PLAIN_DRAG : ANY_DRAG;
+    if (f.kind == ANY_DRAG) {
+        f.directional = craft->drag_area == DIRECTIONAL;
+        f.ahead = drag_factor_ahead(craft);
+        f.abeam = drag_factor_abeam(craft);
+        f.spin = spin_drag_factor(craft);
+    }
     steer(&f, &drive->start);
     return f;
 }
 
-static inline struct loads loads_at(struct load_function *f, double heading, double vx, double vy,
-                                    double yaw_rate)
+/* All loads on a craft that slides. */
+static struct load_function sliding_load_function(const struct drive *drive, const struct craft *craft)
+{
+    struct load_function f = load_function(drive, craft);
+    f.slides = true;
+    f.force = friction_force(craft);
+    f.radius = friction_radius(craft);
+    return f;
+}
+
+/* Velocity of the centre of drag through the air, body frame, and k*q. */
+struct air {
+    double u, w; /* m/s */
+    double kq;   /* kg/s */
+};
+
+static inline struct air air_at(const struct load_function *f, double c, double s, double vx, double vy,
+                                double yaw_rate)
+{
+    struct air air;
+    if (f->kind == WITHOUT_DRAG)
+        return (struct air){0.0, 0.0, 0.0};
+    if (f->kind == ANY_DRAG) {
+        vx = vx - f->wind_x;
+        vy = vy - f->wind_y;
+    }
+    air.u = c * vx + s * vy;
+    air.w = c * vy - s * vx + yaw_rate * f->x_d;
+    air.kq = f->directional ? f->ahead * fabs(air.u) + f->abeam * fabs(air.w)
+                            : f->k * sqrt(air.u * air.u + air.w * air.w);
+    return air;
+}
+
+static double slip_speed(double vx, double vy, double turning)
+{
+    return sqrt(vx * vx + vy * vy + turning * turning);
+}
+
+static inline struct loads loads_at(struct load_function *f, double heading, double vx, double vy, double yaw_rate)
 {
     const struct trig_pair turned = sine_cosine(heading, &f->last);
     const double c = turned.cosine, s = turned.sine;
-    const double u = c * vx + s * vy;
-    const double w = c * vy - s * vx + yaw_rate * f->x_d;
-    const double kq = f->k * sqrt(u * u + w * w);
-    const double drag_y = -kq * w;
-    const double force_x = f->thrust - kq * u;
-    const double force_y = drag_y + f->side;
-    return (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, f->x_d * drag_y + f->turn, kq};
+    struct loads loads;
+    if (f->kind == WITHOUT_DRAG) {
+        loads = (struct loads){c * f->thrust - s * f->side, s * f->thrust + c * f->side, f->turn, 0.0};
+    } else {
+        const struct air air = air_at(f, c, s, vx, vy, yaw_rate);
+        const double drag_y = -air.kq * air.w;
+        const double force_x = f->thrust - air.kq * air.u;
+        const double force_y = drag_y + f->side;
+        double moment = f->x_d * drag_y + f->turn;
+        if (f->kind == ANY_DRAG)
+            moment = moment - f->spin * yaw_rate * fabs(yaw_rate);
+        loads = (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, moment, air.kq};
+    }
+    if (f->slides) {
+        const double turning = f->radius * yaw_rate;
+        const double grip = f->force / larger(slip_speed(vx, vy, turning), LEAST_SLIP);
+        loads.x = loads.x - grip * vx;
+        loads.y = loads.y - grip * vy;
+        loads.moment = loads.moment - grip * f->radius * turning;
+    }
+    return loads;
+}
+
+/* How much of v, and of rho*r, friction can take away in a time [m/s]. */
+struct friction {
+    bool rubs;
+    double a, b, radius;
+};
+
+enum { NEWTON = 30 };
+
+static struct friction friction_function(const struct craft *craft, double h)
+{
+    struct friction friction = {.rubs = rubs(craft)};
+    if (friction.rubs) {
+        const double radius = friction_radius(craft), force = friction_force(craft);
+        friction.radius = radius;
+        friction.a = h * (force / craft->mass);
+        friction.b = h * (force * radius * radius / craft->inertia);
+    }
+    return friction;
+}
+
+/* What friction makes of velocities that were reached without it: an implicit step. */
+static void rub(const struct friction *friction, double *vx, double *vy, double *yaw_rate)
+{
+    const double a = friction->a, b = friction->b, turning = friction->radius * *yaw_rate;
+    const double straight = *vx * *vx + *vy * *vy, turned = turning * turning;
+    if (straight * (b * b) + turned * (a * a) <= (a * a) * (b * b)) { /* it holds */
+        *vx = *vy = *yaw_rate = 0.0;
+        return;
+    }
+    double q = larger(sqrt(straight + turned) - larger(a, b), 0.0);
+    for (int i = 0; i < NEWTON; i++) {
+        const double of_v = q + a, of_r = q + b;
+        const double part_v = straight / (of_v * of_v), part_r = turned / (of_r * of_r);
+        const double size = part_v + part_r;
+        const double new = q + size * (sqrt(size) - 1.0) / (part_v / of_v + part_r / of_r);
+        if (!(new > q))
+            break;
+        q = new;
+    }
+    const double of_v = q / (q + a), of_r = q / (q + b);
+    *vx = *vx * of_v;
+    *vy = *vy * of_v;
+    *yaw_rate = *yaw_rate * of_r;
+}
+
+/* What friction leaves of a push on a craft at rest: its implicit step from rest, over any time, gives the rate. */
+static struct loads loads_at_rest(struct load_function *f, double heading)
+{
+    const struct craft *craft = f->craft;
+    const struct friction friction = friction_function(craft, 1.0);
+    const struct loads push = loads_at(f, heading, 0.0, 0.0, 0.0);
+    double ax = push.x / craft->mass, ay = push.y / craft->mass, turning = push.moment / craft->inertia;
+    rub(&friction, &ax, &ay, &turning);
+    return (struct loads){craft->mass * ax, craft->mass * ay, craft->inertia * turning, push.kq};
 }
 
 struct loads kernel_loads_on(const struct state *state, const struct controls *controls, const struct craft *craft)
 {
     const struct drive drive = {.start = *controls};
-    struct load_function f = load_function(&drive, craft);
+    struct load_function f = rubs(craft) ? sliding_load_function(&drive, craft) : load_function(&drive, craft);
+    if (rubs(craft) && state->vx == 0.0 && state->vy == 0.0 && state->yaw_rate == 0.0) {
+        f.slides = false;
+        return loads_at_rest(&f, state->heading);
+    }
     return loads_at(&f, state->heading, state->vx, state->vy, state->yaw_rate);
 }
 
@@ -180,6 +375,7 @@ static struct stretch stretch_of(struct load_function *f, const struct state *s,
 static struct stretch semi_implicit_euler(const struct state *state, struct load_function *f, double h, int64_t n)
 {
     const double mass = f->craft->mass, inertia = f->craft->inertia;
+    const struct friction friction = friction_function(f->craft, h);
     struct state s = *state;
     struct watch watch = {0.0, s.yaw_rate, s.yaw_rate};
     for (int64_t i = 0; i < n; i++) {
@@ -187,9 +383,11 @@ static struct stretch semi_implicit_euler(const struct state *state, struct load
         const struct loads loads = loads_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
         s.vx = s.vx + h * (loads.x / mass);
         s.vy = s.vy + h * (loads.y / mass);
+        s.yaw_rate = s.yaw_rate + h * (loads.moment / inertia);
+        if (friction.rubs)
+            rub(&friction, &s.vx, &s.vy, &s.yaw_rate);
         s.x = s.x + h * s.vx;
         s.y = s.y + h * s.vy;
-        s.yaw_rate = s.yaw_rate + h * (loads.moment / inertia);
         s.heading = s.heading + h * s.yaw_rate;
         watch_loads(&watch, loads.kq);
         watch_yaw_rate(&watch, s.yaw_rate);
@@ -197,36 +395,42 @@ static struct stretch semi_implicit_euler(const struct state *state, struct load
     return stretch_of(f, &s, n, h, &watch);
 }
 
-/* k*q from the sine and cosine that the step has anyway: the same arithmetic as in loads_at. */
-static inline double drag_per_speed(const struct load_function *f, double c, double s, double vx, double vy,
-                                    double yaw_rate)
-{
-    const double u = c * vx + s * vy;
-    const double w = c * vy - s * vx + yaw_rate * f->x_d;
-    return f->k * sqrt(u * u + w * w);
-}
-
 static struct stretch drag_implicit(const struct state *state, struct load_function *f, double h, int64_t n)
 {
     const double mass = f->craft->mass, inertia = f->craft->inertia, x_d = f->x_d;
-    const double spread = inertia + mass * x_d * x_d;
+    const double spin = spin_drag_factor(f->craft), arm = mass * x_d * x_d;
+    const bool in_wind = is_windy(f->drive), spins = f->craft->rotational_drag != 0.0;
+    const struct friction friction = friction_function(f->craft, h);
+    double damped = inertia;
     struct state z = *state;
     struct watch watch = {0.0, z.yaw_rate, z.yaw_rate};
     for (int64_t i = 0; i < n; i++) {
         steer_at(f, (double)i * h);
         const struct trig_pair turned = sine_cosine(z.heading, &f->last);
         const double c = turned.cosine, s = turned.sine;
-        const double kq = drag_per_speed(f, c, s, z.vx, z.vy, z.yaw_rate);
+        const double kq = air_at(f, c, s, z.vx, z.vy, z.yaw_rate).kq;
         const double g = h * kq;
+        if (in_wind) {
+            z.vx = z.vx - f->wind_x;
+            z.vy = z.vy - f->wind_y;
+        }
+        if (spins)
+            damped = inertia + h * spin * fabs(z.yaw_rate);
         const double surge = (mass * (c * z.vx + s * z.vy) + h * f->thrust) / (mass + g);
         const double a = mass * (c * z.vy - s * z.vx) + h * f->side;
         const double b = inertia * z.yaw_rate + h * f->turn;
         const double e = x_d * a - b;
-        const double determinant = mass * inertia + g * spread;
-        const double sway = (inertia * a + g * x_d * e) / determinant;
+        const double determinant = mass * damped + g * (damped + arm);
+        const double sway = (damped * a + g * x_d * e) / determinant;
         z.yaw_rate = (mass * b - g * e) / determinant;
         z.vx = c * surge - s * sway;
         z.vy = s * surge + c * sway;
+        if (in_wind) {
+            z.vx = z.vx + f->wind_x;
+            z.vy = z.vy + f->wind_y;
+        }
+        if (friction.rubs)
+            rub(&friction, &z.vx, &z.vy, &z.yaw_rate);
         z.x = z.x + h * z.vx;
         z.y = z.y + h * z.vy;
         z.heading = z.heading + h * z.yaw_rate;
@@ -245,7 +449,7 @@ static inline struct loads accelerations_at(struct load_function *f, double head
                           loads.kq};
 }
 
-static struct stretch rk4(const struct state *state, struct load_function *f, double h, int64_t n)
+static struct stretch smooth_rk4(const struct state *state, struct load_function *f, double h, int64_t n)
 {
     const double half = 0.5 * h, sixth = h / 6.0, square = h * h / 6.0;
     struct state s = *state;
@@ -280,6 +484,30 @@ static struct stretch rk4(const struct state *state, struct load_function *f, do
         watch_yaw_rate(&watch, s.yaw_rate);
     }
     return stretch_of(f, &s, n, h, &watch);
+}
+
+/* While it slides, friction is a load like others. Near rest it is not: an implicit step of Euler's. */
+static struct stretch rk4_with_friction(const struct state *state, struct load_function *f, double h, int64_t n)
+{
+    struct load_function sliding = sliding_load_function(f->drive, f->craft);
+    const struct friction friction = friction_function(f->craft, h);
+    const double near = NEAR_REST * larger(friction.a, friction.b);
+    struct stretch whole = {*state, n, 0.0, 0.0, 0.0, h};
+    for (int64_t i = 0; i < n; i++) {
+        const struct state *s = &whole.state;
+        const bool at_rest = slip_speed(s->vx, s->vy, friction.radius * s->yaw_rate) <= near;
+        f->begun = sliding.begun = (double)i * h;
+        const struct stretch one = at_rest ? semi_implicit_euler(s, f, h, 1) : smooth_rk4(s, &sliding, h, 1);
+        whole.state = one.state;
+        whole.drag = larger(whole.drag, one.drag);
+        whole.rotation = larger(whole.rotation, one.rotation);
+    }
+    return whole;
+}
+
+static struct stretch rk4(const struct state *state, struct load_function *f, double h, int64_t n)
+{
+    return rubs(f->craft) ? rk4_with_friction(state, f, h, n) : smooth_rk4(state, f, h, n);
 }
 
 enum { STAGES = 7, COMPONENTS = 6 };
@@ -337,19 +565,59 @@ static double dormand_prince(struct load_function *f, double time, const double 
     return isfinite(sum) ? error : INFINITY;
 }
 
-static enum outcome adaptive(const struct state *state, struct load_function *f, double duration, double tolerance,
-                             double proposed, struct stretch *stretch)
+/* Whether the craft slides, and then the longest step [s]; without friction, any. */
+static bool can_slide(const struct load_function *f, const double y[COMPONENTS], const struct rates *rates,
+                      const struct friction *friction, double tolerance, double *longest)
 {
+    *longest = INFINITY;
+    if (!friction->rubs)
+        return true;
+    const double turning = f->radius * y[5], speed = slip_speed(y[3], y[4], turning);
+    if (!(speed > tolerance))
+        return false;
+    const double gain = (y[3] * rates->of[3] + y[4] * rates->of[4] + f->radius * turning * rates->of[5]) / speed;
+    *longest = speed / larger(larger(friction->a, friction->b), NEAR_REST * -gain);
+    return *longest > MIN_STEP;
+}
+
+/* An implicit step of Euler's; its error is at most all that it changes of the velocity, and h times that. */
+static double near_rest(struct load_function *free, struct load_function *f, double time, const double y[COMPONENTS],
+                        double h, struct rates *rates, double new[COMPONENTS])
+{
+    const struct state before = {y[0], y[1], y[2], y[3], y[4], y[5]};
+    free->begun = time;
+    const struct state after = semi_implicit_euler(&before, free, h, 1).state;
+    const double values[COMPONENTS] = {after.x, after.y, after.heading, after.vx, after.vy, after.yaw_rate};
+    double change = fabs(values[3] - y[3]);
+    for (int i = 0; i < COMPONENTS; i++)
+        new[i] = values[i];
+    for (int i = 4; i < COMPONENTS; i++)
+        change = larger(change, fabs(values[i] - y[i]));
+    steer_at(f, time + h);
+    *rates = rates_at(f, new);
+    const double error = change * larger(1.0, h);
+    return isfinite(error) && !isinf(after.heading) ? error : INFINITY;
+}
+
+static enum outcome adaptive(const struct state *state, const struct drive *drive, const struct craft *craft,
+                             double duration, double tolerance, double proposed, struct stretch *stretch)
+{
+    struct load_function free = load_function(drive, craft);
+    struct load_function f = rubs(craft) ? sliding_load_function(drive, craft) : free;
+    const struct friction friction = friction_function(craft, 1.0);
     double y[COMPONENTS] = {state->x, state->y, state->heading, state->vx, state->vy, state->yaw_rate};
     double time = 0.0, most = 0.0, fastest = 0.0;
     int64_t count = 0;
     struct rates stages[STAGES];
-    stages[0] = rates_at(f, y);
+    stages[0] = rates_at(&f, y);
     while (time < duration) {
-        const bool last = proposed >= duration - time;
-        const double h = last ? duration - time : proposed;
-        double new[COMPONENTS];
-        const double error = dormand_prince(f, time, y, h, stages, new);
+        double new[COMPONENTS], longest, h = smaller(duration - time, proposed);
+        const bool slides = can_slide(&f, y, &stages[0], &friction, tolerance, &longest);
+        if (slides)
+            h = smaller(h, longest);
+        const bool last = h >= duration - time;
+        const double error = slides ? dormand_prince(&f, time, y, h, stages, new)
+                                    : near_rest(&free, &f, time, y, h, &stages[STAGES - 1], new);
         if (!(error <= tolerance)) {
             proposed = error < INFINITY ? h * larger(0.2, 0.9 * sqrt(sqrt(tolerance / error))) : 0.2 * h;
             if (proposed < MIN_STEP) {
@@ -367,7 +635,7 @@ static enum outcome adaptive(const struct state *state, struct load_function *f,
         count++;
         most = larger(most, h * stages[0].kq);
         fastest = larger(fastest, h * fabs(y[5]));
-        if (!last)
+        if (!last) /* a step cut short by the end says nothing against the one proposed */
             proposed = h * smaller(5.0, error > 0.0 ? 0.9 * sqrt(sqrt(tolerance / error)) : 5.0);
     }
     *stretch = (struct stretch){{y[0], y[1], y[2], y[3], y[4], y[5]}, count, most, fastest, proposed, 0.0};
@@ -408,7 +676,7 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
     int64_t n;
     double h;
     if (settings->integrator == ADAPTIVE)
-        return adaptive(state, &f, communication_step, settings->tolerance,
+        return adaptive(state, drive, craft, communication_step, settings->tolerance,
                         proposed != 0.0 ? proposed : settings->step_size, stretch);
     if (!substeps(communication_step, settings->step_size, &n, &h))
         return TOO_MANY_SUBSTEPS;
@@ -420,8 +688,10 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
     return is_finite(&stretch->state) ? ADVANCED : NOT_FINITE;
 }
 
-double kernel_stability_number(double drag, const struct craft *craft)
+double kernel_stability_number(double drag, double rotation, const struct craft *craft)
 {
     const double x_d = drag_center(craft);
-    return 2.0 * drag * (1.0 / craft->mass + x_d * x_d / craft->inertia);
+    const double drag_rate = 2.0 * (1.0 / craft->mass + x_d * x_d / craft->inertia);
+    const double spin_rate = 2.0 * spin_drag_factor(craft) / craft->inertia;
+    return drag * drag_rate + rotation * spin_rate;
 }

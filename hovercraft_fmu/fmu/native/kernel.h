@@ -10,6 +10,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+enum drag_area { CONSTANT = 1, DIRECTIONAL };
+
 /* Constants of one craft, in the order of craft.py; the caller has checked them. */
 struct craft {
     double mass;                 /* kg */
@@ -23,6 +25,10 @@ struct craft {
     double steering_force;       /* N */
     double thrust_min;           /* N */
     double thrust_max;           /* N */
+    int32_t drag_area;           /* enum drag_area */
+    double skirt_friction;       /* 1 */
+    double gravity;              /* m/s2 */
+    double rotational_drag;      /* 1 */
 };
 
 struct state {
@@ -35,6 +41,7 @@ struct state {
 struct controls {
     double thrust;          /* N */
     double port, starboard; /* 1 */
+    double wind_x, wind_y;  /* m/s: the velocity of the air */
 };
 
 /* The controls over a communication step: `start + t*rate`, then saturated. Without ramps they hold, and the bits are
@@ -86,7 +93,7 @@ double kernel_steering(const struct controls *controls, const struct craft *craf
 struct loads kernel_loads_on(const struct state *state, const struct controls *controls, const struct craft *craft);
 /* Surge and sway [m/s]. */
 void kernel_body_velocity(const struct state *state, double *surge, double *sway);
-double kernel_stability_number(double drag, const struct craft *craft);
+double kernel_stability_number(double drag, double rotation, const struct craft *craft);
 
 /* The state one communication step [s], greater than 0, later. `proposed` [s] is what the last stretch of the adaptive
    method returned, 0 at the start. */

@@ -79,6 +79,17 @@ static void exchange_state(struct cursor *cursor, struct content *c)
     }
 }
 
+static void exchange_craft(struct cursor *cursor, struct craft *craft)
+{
+    for (unsigned i = 0; i < CRAFT_COUNT; i++) {
+        char *field = (char *)craft + CRAFT_FIELDS[i].offset;
+        if (VARIABLES[CRAFT_FIELDS[i].reference].kind == REAL)
+            exchange_double(cursor, (double *)(void *)field);
+        else
+            exchange_integer(cursor, (int32_t *)(void *)field);
+    }
+}
+
 /* All of the content that cannot be worked out from the rest; the same for writing and reading. */
 static void exchange(struct cursor *cursor, struct content *c)
 {
@@ -99,9 +110,9 @@ static void exchange(struct cursor *cursor, struct content *c)
     exchange_double(cursor, &c->hosts_tolerance);
     exchange_state(cursor, c);
     exchange_doubles(cursor, &c->controls, sizeof c->controls);
-    exchange_doubles(cursor, &c->craft, sizeof c->craft);
+    exchange_craft(cursor, &c->craft);
     exchange_double(cursor, &c->proposed);
-    exchange_double(cursor, &c->drag);
+    exchange_double(cursor, &c->stability);
     exchange_double(cursor, &c->rotation);
     c->phase = phase >= 0 && phase < PHASE_COUNT ? (enum phase)phase : PHASE_COUNT;
     c->tuned = tuned != 0;
@@ -159,7 +170,7 @@ static bool is_of_this_build(const unsigned char *bytes, size_t size)
 /* The words are right; whoever can work out a checksum may still have written anything. */
 static bool is_possible(const struct content *c)
 {
-    const int32_t most = (int32_t)(sizeof METHODS / sizeof *METHODS);
+    const int32_t most = INTEGRATOR_COUNT;
     const bool started = c->phase == STEPPING || c->phase == TERMINATED;
     const int32_t kept = c->integers[V_INTEGRATOR], used = c->settings.integrator;
     return c->phase < PHASE_COUNT && kept >= 1 && kept <= most && (!started || (used >= 1 && used <= most)) &&

@@ -1,12 +1,12 @@
 /* Sine and cosine with the same bits on every platform: fdlibm's polynomials and its reduction of the argument, both
    functions at once, so that one reduction does.
 
-   Angles that follow one another mostly lie in the same quarter turn. So the multiple of pi/2 that is taken away is kept
-   from one angle to the next, and only checked: the check is not in the chain of dependent operations that a sub-step is,
-   and neither are the tails. The result depends on the angle alone.
+   Angles that follow one another mostly lie in the same quarter turn. So the multiple of pi/2 that is taken away is
+   kept from one angle to the next, and only checked: the check is not in the chain of dependent operations that a
+   sub-step is, and neither are the tails. The result depends on the angle alone.
 
-   The constants, the reduction and the bounds are fdlibm's (k_sin.c, k_cos.c, e_rem_pio2.c, k_rem_pio2.c, as FreeBSD and
-   musl keep them); the polynomials are summed in another order, pairs first. They come with this notice:
+   The constants, the reduction and the bounds are fdlibm's (k_sin.c, k_cos.c, e_rem_pio2.c, k_rem_pio2.c, as FreeBSD
+   and musl keep them); the polynomials are summed in another order, pairs first. They come with this notice:
 
    ====================================================
    Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.

@@ -1,0 +1,9 @@
+/* The natural logarithm with the same bits on every platform. */
+
+#ifndef HOVERCRAFT_LOGARITHM_H
+#define HOVERCRAFT_LOGARITHM_H
+
+/* Of a number greater than 0, within one unit in the last place. */
+double logarithm_of(double x);
+
+#endif
