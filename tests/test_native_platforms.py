@@ -45,7 +45,11 @@ def runs_header() -> str:
     table = []
     for name, run in runs().items():
         rows = [(time, end - time, *held) for time, end, held in schedule(run)]
-        lines += [f"static const double {name}[][2 + INPUT_COUNT] = {{", *(f"    {_braced(map(repr, row))}," for row in rows), "};"]
+        lines += [
+            f"static const double {name}[][2 + INPUT_COUNT] = {{",
+            *(f"    {_braced(map(repr, row))}," for row in rows),
+            "};",
+        ]
         values = {key: value for key, value in run.start_values.items() if key != "integrator"}
         references = _braced(constant(key) for key in values)
         numbers = _braced(repr(float(value)) for value in values.values())

@@ -199,4 +199,4 @@ TITLES = ("what", "native", "compared with", "that", "ratio")
 
 def _cells(cost: Cost) -> tuple[str, ...]:
     native, other = (f"{value:.3g} {cost.unit}" for value in (cost.native, cost.other))
-    return cost.what, native, cost.compared_with, other, f"{cost.ratio:.2g} x"
+    return cost.what, native, cost.compared_with, other, f"{cost.ratio:.3g} x"

@@ -5,6 +5,13 @@
 #include "logarithm.h"
 #include "trig.h"
 
+/* Without it a compiler calls what a sub-step is made of, and keeps its numbers in memory meanwhile. */
+#ifdef __GNUC__
+#define ALWAYS_INLINE inline __attribute__((always_inline))
+#else
+#define ALWAYS_INLINE inline
+#endif
+
 static const double MIN_STEP = 1e-12;     /* s: below it the adaptive method gives up */
 static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
 static const double NEAR_REST = 4.0;      /* sub-steps in which friction could stop the craft */
@@ -221,19 +228,19 @@ struct air {
     double kq;   /* kg/s */
 };
 
-static inline struct air air_at(const struct load_function *f, double c, double s, double vx, double vy,
-                                double yaw_rate)
+static ALWAYS_INLINE struct air air_at(const struct load_function *f, enum drag_kind kind, double c, double s,
+                                       double vx, double vy, double yaw_rate)
 {
     struct air air;
-    if (f->kind == WITHOUT_DRAG)
+    if (kind == WITHOUT_DRAG)
         return (struct air){0.0, 0.0, 0.0};
-    if (f->kind == ANY_DRAG) {
+    if (kind == ANY_DRAG) {
         vx = vx - f->wind_x;
         vy = vy - f->wind_y;
     }
     air.u = c * vx + s * vy;
     air.w = c * vy - s * vx + yaw_rate * f->x_d;
-    air.kq = f->directional ? f->ahead * fabs(air.u) + f->abeam * fabs(air.w)
+    air.kq = kind == ANY_DRAG && f->directional ? f->ahead * fabs(air.u) + f->abeam * fabs(air.w)
                             : f->k * sqrt(air.u * air.u + air.w * air.w);
     return air;
 }
@@ -243,24 +250,26 @@ static double slip_speed(double vx, double vy, double turning)
     return sqrt(vx * vx + vy * vy + turning * turning);
 }
 
-static inline struct loads loads_at(struct load_function *f, double heading, double vx, double vy, double yaw_rate)
+/* For a kind, and a sliding, that the compiler may know. */
+static ALWAYS_INLINE struct loads loads_as(struct load_function *f, enum drag_kind kind, bool slides, double heading,
+                                           double vx, double vy, double yaw_rate)
 {
     const struct trig_pair turned = sine_cosine(heading, &f->last);
     const double c = turned.cosine, s = turned.sine;
     struct loads loads;
-    if (f->kind == WITHOUT_DRAG) {
+    if (kind == WITHOUT_DRAG) {
         loads = (struct loads){c * f->thrust - s * f->side, s * f->thrust + c * f->side, f->turn, 0.0};
     } else {
-        const struct air air = air_at(f, c, s, vx, vy, yaw_rate);
+        const struct air air = air_at(f, kind, c, s, vx, vy, yaw_rate);
         const double drag_y = -air.kq * air.w;
         const double force_x = f->thrust - air.kq * air.u;
         const double force_y = drag_y + f->side;
         double moment = f->x_d * drag_y + f->turn;
-        if (f->kind == ANY_DRAG)
+        if (kind == ANY_DRAG)
             moment = moment - f->spin * yaw_rate * fabs(yaw_rate);
         loads = (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, moment, air.kq};
     }
-    if (f->slides) {
+    if (slides) {
         const double turning = f->radius * yaw_rate;
         const double grip = f->force / larger(slip_speed(vx, vy, turning), LEAST_SLIP);
         loads.x = loads.x - grip * vx;
@@ -268,6 +277,11 @@ static inline struct loads loads_at(struct load_function *f, double heading, dou
         loads.moment = loads.moment - grip * f->radius * turning;
     }
     return loads;
+}
+
+static struct loads loads_at(struct load_function *f, double heading, double vx, double vy, double yaw_rate)
+{
+    return loads_as(f, f->kind, f->slides, heading, vx, vy, yaw_rate);
 }
 
 /* How much of v, and of rho*r, friction can take away in a time [m/s]. */
@@ -372,7 +386,8 @@ static struct stretch stretch_of(struct load_function *f, const struct state *s,
     return (struct stretch){*s, n, h * most, h * larger(watch->right, -watch->left), 0.0, h};
 }
 
-static struct stretch semi_implicit_euler(const struct state *state, struct load_function *f, double h, int64_t n)
+static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, const struct state *state, struct load_function *f,
+                                             double h, int64_t n)
 {
     const double mass = f->craft->mass, inertia = f->craft->inertia;
     const struct friction friction = friction_function(f->craft, h);
@@ -380,7 +395,7 @@ static struct stretch semi_implicit_euler(const struct state *state, struct load
     struct watch watch = {0.0, s.yaw_rate, s.yaw_rate};
     for (int64_t i = 0; i < n; i++) {
         steer_at(f, (double)i * h);
-        const struct loads loads = loads_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
+        const struct loads loads = loads_as(f, kind, false, s.heading, s.vx, s.vy, s.yaw_rate);
         s.vx = s.vx + h * (loads.x / mass);
         s.vy = s.vy + h * (loads.y / mass);
         s.yaw_rate = s.yaw_rate + h * (loads.moment / inertia);
@@ -393,6 +408,12 @@ static struct stretch semi_implicit_euler(const struct state *state, struct load
         watch_yaw_rate(&watch, s.yaw_rate);
     }
     return stretch_of(f, &s, n, h, &watch);
+}
+
+/* The compiler makes a loop of its own for the default's drag: what a scene does not ask for costs nothing. */
+static struct stretch semi_implicit_euler(const struct state *state, struct load_function *f, double h, int64_t n)
+{
+    return f->kind == PLAIN_DRAG ? euler_as(PLAIN_DRAG, state, f, h, n) : euler_as(f->kind, state, f, h, n);
 }
 
 static struct stretch drag_implicit(const struct state *state, struct load_function *f, double h, int64_t n)
@@ -408,7 +429,7 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
         steer_at(f, (double)i * h);
         const struct trig_pair turned = sine_cosine(z.heading, &f->last);
         const double c = turned.cosine, s = turned.sine;
-        const double kq = air_at(f, c, s, z.vx, z.vy, z.yaw_rate).kq;
+        const double kq = air_at(f, f->kind, c, s, z.vx, z.vy, z.yaw_rate).kq;
         const double g = h * kq;
         if (in_wind) {
             z.vx = z.vx - f->wind_x;
@@ -441,15 +462,16 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
 }
 
 /* The accelerations in place of the loads. */
-static inline struct loads accelerations_at(struct load_function *f, double heading, double vx, double vy,
-                                            double yaw_rate)
+static ALWAYS_INLINE struct loads accelerations_as(struct load_function *f, enum drag_kind kind, bool slides,
+                                                   double heading, double vx, double vy, double yaw_rate)
 {
-    const struct loads loads = loads_at(f, heading, vx, vy, yaw_rate);
+    const struct loads loads = loads_as(f, kind, slides, heading, vx, vy, yaw_rate);
     return (struct loads){loads.x / f->craft->mass, loads.y / f->craft->mass, loads.moment / f->craft->inertia,
                           loads.kq};
 }
 
-static struct stretch smooth_rk4(const struct state *state, struct load_function *f, double h, int64_t n)
+static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, bool slides, const struct state *state,
+                                           struct load_function *f, double h, int64_t n)
 {
     const double half = 0.5 * h, sixth = h / 6.0, square = h * h / 6.0;
     struct state s = *state;
@@ -457,17 +479,18 @@ static struct stretch smooth_rk4(const struct state *state, struct load_function
     for (int64_t i = 0; i < n; i++) {
         const double t = (double)i * h;
         steer_at(f, t);
-        const struct loads a1 = accelerations_at(f, s.heading, s.vx, s.vy, s.yaw_rate);
+        const struct loads a1 = accelerations_as(f, kind, slides, s.heading, s.vx, s.vy, s.yaw_rate);
         const double r2 = s.yaw_rate + half * a1.moment;
         steer_at(f, t + half);
-        const struct loads a2 = accelerations_at(f, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
+        const struct loads a2 = accelerations_as(f, kind, slides, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
                                                  s.vy + half * a1.y, r2);
         const double r3 = s.yaw_rate + half * a2.moment;
         const struct loads a3 =
-            accelerations_at(f, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
+            accelerations_as(f, kind, slides, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
         const double r4 = s.yaw_rate + h * a3.moment;
         steer_at(f, t + h);
-        const struct loads a4 = accelerations_at(f, s.heading + h * r3, s.vx + h * a3.x, s.vy + h * a3.y, r4);
+        const struct loads a4 = accelerations_as(f, kind, slides, s.heading + h * r3, s.vx + h * a3.x,
+                                                 s.vy + h * a3.y, r4);
         s.x = s.x + h * s.vx + square * (a1.x + a2.x + a3.x);
         s.y = s.y + h * s.vy + square * (a1.y + a2.y + a3.y);
         s.heading = s.heading + h * s.yaw_rate + square * (a1.moment + a2.moment + a3.moment);
@@ -484,6 +507,12 @@ static struct stretch smooth_rk4(const struct state *state, struct load_function
         watch_yaw_rate(&watch, s.yaw_rate);
     }
     return stretch_of(f, &s, n, h, &watch);
+}
+
+static struct stretch smooth_rk4(const struct state *state, struct load_function *f, double h, int64_t n)
+{
+    return f->kind == PLAIN_DRAG && !f->slides ? rk4_as(PLAIN_DRAG, false, state, f, h, n)
+                                               : rk4_as(f->kind, f->slides, state, f, h, n);
 }
 
 /* While it slides, friction is a load like others. Near rest it is not: an implicit step of Euler's. */
@@ -534,7 +563,7 @@ struct rates {
 
 static struct rates rates_at(struct load_function *f, const double y[COMPONENTS])
 {
-    const struct loads a = accelerations_at(f, y[2], y[3], y[4], y[5]);
+    const struct loads a = accelerations_as(f, f->kind, f->slides, y[2], y[3], y[4], y[5]);
     return (struct rates){{y[3], y[4], y[5], a.x, a.y, a.moment}, a.kq};
 }
 
