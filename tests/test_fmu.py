@@ -45,7 +45,12 @@ SETTINGS: dict[str, dict[str, Any]] = {
 }
 
 
-EVERY_TERM: dict[str, Any] = {"drag_area": "directional", "rotational_drag": 0.5, "skirt_friction": 0.002, "gravity": 9.5}
+EVERY_TERM: dict[str, Any] = {
+    "drag_area": "directional",
+    "rotational_drag": 0.5,
+    "skirt_friction": 0.002,
+    "gravity": 9.5,
+}
 
 
 def planned() -> dict[str, Run]:

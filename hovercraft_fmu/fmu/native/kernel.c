@@ -524,7 +524,7 @@ static struct stretch rk4_with_friction(const struct state *state, struct load_f
     struct stretch whole = {*state, n, 0.0, 0.0, 0.0, h};
     for (int64_t i = 0; i < n; i++) {
         const struct state *s = &whole.state;
-        const bool at_rest = slip_speed(s->vx, s->vy, friction.radius * s->yaw_rate) <= near;
+        const bool at_rest = slip_speed(s->vx, s->vy, friction.radius * s->yaw_rate) < near;
         f->begun = sliding.begun = (double)i * h;
         const struct stretch one = at_rest ? semi_implicit_euler(s, f, h, 1) : smooth_rk4(s, &sliding, h, 1);
         whole.state = one.state;
