@@ -222,9 +222,10 @@ SCENES: Mapping[str, Scene] = MappingProxyType(
             Scene(
                 "drift_to_rest",
                 "sliding and spinning to rest on ground that rubs; a push that friction holds, and one it does not",
-                held(60.0, (0.0, 0.0, 0.0, 0.0), (35.0, 3.0, 0.0, 0.0), (45.0, 8.0, 0.0, 0.0)),
-                parameters={"skirt_friction": 0.005},
-                start=State(vx=0.6, vy=-0.8, yaw_rate=0.3),
+                held(60.0, (0.0, 0.0, 0.0, 0.0), (40.0, 5.0, 0.0, 0.0), (48.0, 10.0, 0.0, 0.0)),
+                preset="ice",
+                parameters={"skirt_friction": 0.008},
+                start=State(vx=2.0, vy=-1.5, yaw_rate=0.4),
             ),
         )
     }

@@ -40,8 +40,8 @@ def _solved(scene: Scene, stop_time: float, tolerance: float) -> NDArray[np.floa
     return state
 
 
-REST = 1e-10
-"""m/s: sliding slower than this a craft is at rest; it stops within nanoseconds."""
+REST = 100.0
+"""Tolerances: sliding slower than this, in m/s, the solver would only jump to and fro about the point of rest."""
 
 
 def _stretch(
@@ -57,7 +57,7 @@ def _stretch(
         return derivatives(State(*y), controls, craft)
 
     def slip(_time: float, y: NDArray[np.float64]) -> float:
-        return slip_speed(y[3], y[4], friction_radius(craft) * y[5]) - REST
+        return slip_speed(y[3], y[4], friction_radius(craft) * y[5]) - REST * tolerance
 
     slip.terminal, slip.direction = True, -1.0  # type: ignore[attr-defined]
     events = slip if craft.rubs else None
