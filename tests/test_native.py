@@ -69,10 +69,9 @@ def test_every_scene_and_method_is_close_to_the_bare_model(name: str, method: st
     found, expected = run_fmu(run, native_fmu), run_model(run)
     assert found.warnings == ()
     assert np.array_equal(found["substeps"], expected["substeps"])
-    near = 1e-12 if method != "drag_implicit" else 1e-14 * float(expected["substeps"][-1])  # see test_native_kernel
     for column in (*INPUTS, *OUTPUTS):
         gap = np.abs(found[column] - expected[column])
-        assert (gap <= near * np.maximum(1.0, np.abs(expected[column]))).all(), column
+        assert (gap <= 1e-12 * np.maximum(1.0, np.abs(expected[column]))).all(), column
 
 
 def test_other_hosts_give_the_bits_that_fmpy_gives(native_fmu: Path) -> None:

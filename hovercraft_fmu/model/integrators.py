@@ -88,10 +88,14 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
         (m + g) v' + g x_d r' = m v + h side   =: a
         g x_d v' + (I + g x_d^2) r' = I r + h turn   =: b
 
-    The last two have the determinant m I + g (I + m x_d^2) and, with e = x_d a - b, the solution
-    v' = (I a + g x_d e)/det, r' = (m b - g e)/det (Cramer's rule; what cancels is taken out by hand, so nothing is
-    lost where g is large). The matrix is the mass plus g times a square, so drag alone never adds kinetic energy;
-    straight coasting gives v' = v/(1 + h kappa v), which is exact, and T = k*u*u stays where it is.
+    The last two have the determinant D = m I + g (I + m x_d^2) and, with e = x_d a - b, the solution
+    v' = (I a + g x_d e)/D, r' = (m b - g e)/D (Cramer's rule; what cancels is taken out by hand, so nothing is lost
+    where g is large). The matrix is the mass plus g times a square, so drag alone never adds kinetic energy; straight
+    coasting gives v' = v/(1 + h kappa v), which is exact, and T = k*u*u stays where it is.
+
+    Of u and v the share m/(m + g) is kept as it is, in the world frame: turned into the body frame and back at every
+    sub-step, roundings would add up. What is added to it is h T/(m + g) ahead and, to starboard,
+    v' - v m/(m + g) = ((I + g x_d^2) h side + g x_d (x_d g v m/(m + g) - b))/D.
 
     In wind the same holds of the velocity through the air, which is what drag takes away. A moment of the rotation
     itself, -d r |r|, adds h d |r| to I on the left side. Friction is an implicit step of its own, after it.
@@ -103,7 +107,7 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     thrust, side, turn = actuation(controls, craft, ns)
     cos, sin, single = ns.cos, ns.sin, ns is math
     mass, inertia, x_d = craft.mass, craft.inertia, craft.drag_center
-    damped, arm = inertia, mass * x_d * x_d
+    damped, arm, square = inertia, mass * x_d * x_d, x_d * x_d
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
@@ -115,15 +119,16 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
             vx, vy = vx - wind_x, vy - wind_y
         if spins:
             damped = inertia + h * spin * abs(yaw_rate)
-        surge = (mass * (c * vx + s * vy) + h * thrust) / (mass + g)
-        a = mass * (c * vy - s * vx) + h * side
+        v = c * vy - s * vx
         b = inertia * yaw_rate + h * turn
-        e = x_d * a - b
+        e = x_d * (mass * v + h * side) - b
         determinant = mass * damped + g * (damped + arm)
-        sway = (damped * a + g * x_d * e) / determinant
+        kept = mass / (mass + g)
+        surge = h * thrust / (mass + g)
+        sway = ((damped + g * square) * (h * side) + g * x_d * (x_d * (g * kept) * v - b)) / determinant
         yaw_rate = (mass * b - g * e) / determinant
-        vx = c * surge - s * sway
-        vy = s * surge + c * sway
+        vx = kept * vx + (c * surge - s * sway)
+        vy = kept * vy + (s * surge + c * sway)
         if in_wind:
             vx, vy = vx + wind_x, vy + wind_y
         if rubbed:

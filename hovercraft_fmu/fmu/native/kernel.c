@@ -419,7 +419,7 @@ static struct stretch semi_implicit_euler(const struct state *state, struct load
 static struct stretch drag_implicit(const struct state *state, struct load_function *f, double h, int64_t n)
 {
     const double mass = f->craft->mass, inertia = f->craft->inertia, x_d = f->x_d;
-    const double spin = spin_drag_factor(f->craft), arm = mass * x_d * x_d;
+    const double spin = spin_drag_factor(f->craft), arm = mass * x_d * x_d, square = x_d * x_d;
     const bool in_wind = is_windy(f->drive), spins = f->craft->rotational_drag != 0.0;
     const struct friction friction = friction_function(f->craft, h);
     double damped = inertia;
@@ -437,15 +437,17 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
         }
         if (spins)
             damped = inertia + h * spin * fabs(z.yaw_rate);
-        const double surge = (mass * (c * z.vx + s * z.vy) + h * f->thrust) / (mass + g);
-        const double a = mass * (c * z.vy - s * z.vx) + h * f->side;
+        const double v = c * z.vy - s * z.vx;
         const double b = inertia * z.yaw_rate + h * f->turn;
-        const double e = x_d * a - b;
+        const double e = x_d * (mass * v + h * f->side) - b;
         const double determinant = mass * damped + g * (damped + arm);
-        const double sway = (damped * a + g * x_d * e) / determinant;
+        const double kept = mass / (mass + g);
+        const double surge = h * f->thrust / (mass + g);
+        const double sway =
+            ((damped + g * square) * (h * f->side) + g * x_d * (x_d * (g * kept) * v - b)) / determinant;
         z.yaw_rate = (mass * b - g * e) / determinant;
-        z.vx = c * surge - s * sway;
-        z.vy = s * surge + c * sway;
+        z.vx = kept * z.vx + (c * surge - s * sway);
+        z.vy = kept * z.vy + (s * surge + c * sway);
         if (in_wind) {
             z.vx = z.vx + f->wind_x;
             z.vy = z.vy + f->wind_y;
