@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from hovercraft_fmu.cli import commands
+from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import schedule
 from hovercraft_fmu.trade import native_costs
@@ -95,6 +96,9 @@ def test_the_command(tmp_path: Path) -> None:
         costs, before = (records(folder / "native.csv") for folder in (tmp_path, RESULTS))
         assert [row["what"] for row in costs] == [row["what"] for row in before]
         assert all(float(row["native"]) > 0.0 < float(row["other"]) for row in costs)
+        assert {f"{method.name}: a sub-step" for method in INTEGRATORS} <= {row["what"] for row in costs}
+        plain = [row["what"] for row in costs if row["compared_with"].startswith("plain C loop")]
+        assert plain == ["semi_implicit_euler: a sub-step", "adaptive: a sub-step"]
     # what is committed was written by the same command, and tells the same of the errors
     for ours, committed in zip(advice, records(RESULTS / "advice.csv"), strict=True):
         assert float(committed["position_error"]) <= float(committed["accuracy_m"])

@@ -2,7 +2,8 @@
 
    native_costs LIBRARY GUID RESOURCES [substeps]
    With `substeps` also ns a sub-step of each method, beside the same arithmetic with this platform's libm at -O3: a
-   plain loop of semi-implicit Euler, and kernel.c (compiled into this program with HOVERCRAFT_LIBM). */
+   plain loop of semi-implicit Euler and one of Dormand-Prince, which must end in the bits of the kernel, and kernel.c
+   (compiled into this program with HOVERCRAFT_LIBM). */
 
 #include <dlfcn.h>
 #include <math.h>
@@ -17,6 +18,8 @@
 #include "variables.h"
 
 enum { SAMPLES = 21, MOST_CASES = 16, SUBSTEPS = 20000, ALIVE = 100 };
+static const double STEP_SIZE = 0.001;  /* s */
+static const double TOLERANCE = 1e-12;  /* SI units, of the adaptive method: thousands of its own steps in that time */
 
 struct functions {
     fmi2InstantiateTYPE *instantiate;
@@ -26,6 +29,7 @@ struct functions {
     fmi2SetRealTYPE *set;
     fmi2GetRealTYPE *get;
     fmi2SetIntegerTYPE *choose;
+    fmi2GetIntegerTYPE *count;
     fmi2DoStepTYPE *step;
     fmi2ResetTYPE *reset;
     fmi2FreeInstanceTYPE *release;
@@ -86,6 +90,7 @@ static void load(struct host *host, const char *path)
         (fmi2SetRealTYPE *)found(library, "fmi2SetReal"),
         (fmi2GetRealTYPE *)found(library, "fmi2GetReal"),
         (fmi2SetIntegerTYPE *)found(library, "fmi2SetInteger"),
+        (fmi2GetIntegerTYPE *)found(library, "fmi2GetInteger"),
         (fmi2DoStepTYPE *)found(library, "fmi2DoStep"),
         (fmi2ResetTYPE *)found(library, "fmi2Reset"),
         (fmi2FreeInstanceTYPE *)found(library, "fmi2FreeInstance"),
@@ -141,54 +146,132 @@ static double time_of_calls(struct host *host, double size, int steps)
     return (now() - begun) / steps * 1e6;
 }
 
-/* ns a sub-step, inside one communication step. */
+/* ns a sub-step, inside one communication step; the adaptive method cuts it as it likes. */
 static double time_of_substeps(struct host *host, int method)
 {
-    static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER};
+    static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER}, substeps = V_SUBSTEPS;
     const double controls[] = {5.0, 0.5, 0.2};
-    start(host, method, 1e-12);
+    int taken = 0;
+    start(host, method, TOLERANCE);
     demand(host->f.set(host->craft, inputs, 3, controls) == fmi2OK, "fmi2SetReal");
     const double begun = now();
-    demand(host->f.step(host->craft, 0.0, SUBSTEPS * 0.001, fmi2True) <= fmi2Warning, "fmi2DoStep");
-    return (now() - begun) / SUBSTEPS * 1e9;
+    demand(host->f.step(host->craft, 0.0, SUBSTEPS * STEP_SIZE, fmi2True) <= fmi2Warning, "fmi2DoStep");
+    const double spent = now() - begun;
+    demand(host->f.count(host->craft, &substeps, 1, &taken) == fmi2OK && taken > 0, "fmi2GetInteger");
+    return spent / taken * 1e9;
 }
 
-/* What it is measured against; `sink` keeps the compiler from leaving it out. */
-static volatile double sink;
-
-static double time_of_kernel_with_libm(int method)
+/* What it is measured against, from rest: the kernel with libm, and plain loops that must come to the same bits. */
+static double time_of_kernel_with_libm(int method, struct stretch *stretch)
 {
     const struct craft craft = {100.0, 500.0, 20.0, 10.0, 5.0, 1.25, 1.225, -0.25, 3.0, 0.0, 10.0, CONSTANT, 0.0, 9.80665, 0.0};
     const struct drive drive = {.start = {5.0, 0.5, 0.2}};
-    const struct settings settings = {0.001, method, 1e-12};
+    const struct settings settings = {STEP_SIZE, method, TOLERANCE};
     const struct state rest = {.x = 0.0};
-    struct stretch stretch;
     const double begun = now();
-    demand(kernel_advance(&rest, &drive, &craft, SUBSTEPS * 0.001, &settings, 0.0, &stretch) == ADVANCED, "kernel");
-    sink = stretch.state.x;
-    return (now() - begun) / SUBSTEPS * 1e9;
+    demand(kernel_advance(&rest, &drive, &craft, SUBSTEPS * STEP_SIZE, &settings, 0.0, stretch) == ADVANCED, "kernel");
+    return (now() - begun) / (double)stretch->substeps * 1e9;
 }
 
-static double time_of_plain_loop(void)
+static const double MASS = 100.0, INERTIA = 500.0, K = 0.5 * 1.225 * 75.0 * 1.25, X_D = -5.0;
+static const double THRUST = 5.0, SIDE = 3.0 * (0.5 - 0.2), TURN = 30.0 * (0.5 - 0.2);
+
+static double time_of_plain_euler(struct stretch *end)
 {
-    const double mass = 100.0, inertia = 500.0, k = 0.5 * 1.225 * 75.0 * 1.25, x_d = -5.0, h = 0.001;
-    const double thrust = 5.0, side = 3.0 * (0.5 - 0.2), turn = 30.0 * (0.5 - 0.2);
+    const double h = STEP_SIZE;
     double x = 0.0, y = 0.0, heading = 0.0, vx = 0.0, vy = 0.0, yaw_rate = 0.0;
     const double begun = now();
     for (int i = 0; i < SUBSTEPS; i++) {
         const double c = cos(heading), s = sin(heading);
-        const double u = c * vx + s * vy, w = c * vy - s * vx + yaw_rate * x_d;
-        const double kq = k * sqrt(u * u + w * w), drag_y = -kq * w;
-        const double force_x = thrust - kq * u, force_y = drag_y + side;
-        vx += h * ((c * force_x - s * force_y) / mass);
-        vy += h * ((s * force_x + c * force_y) / mass);
+        const double u = c * vx + s * vy, w = c * vy - s * vx + yaw_rate * X_D;
+        const double kq = K * sqrt(u * u + w * w), drag_y = -kq * w;
+        const double force_x = THRUST - kq * u, force_y = drag_y + SIDE;
+        vx += h * ((c * force_x - s * force_y) / MASS);
+        vy += h * ((s * force_x + c * force_y) / MASS);
+        yaw_rate += h * ((X_D * drag_y + TURN) / INERTIA);
         x += h * vx;
         y += h * vy;
-        yaw_rate += h * ((x_d * drag_y + turn) / inertia);
         heading += h * yaw_rate;
     }
-    sink = x + y;
+    *end = (struct stretch){.state = {x, y, heading, vx, vy, yaw_rate}, .substeps = SUBSTEPS};
     return (now() - begun) / SUBSTEPS * 1e9;
+}
+
+static void rates_of(const double y[6], double rates[6])
+{
+    const double c = cos(y[2]), s = sin(y[2]);
+    const double u = c * y[3] + s * y[4], w = c * y[4] - s * y[3] + y[5] * X_D;
+    const double kq = K * sqrt(u * u + w * w), drag_y = -kq * w;
+    const double force_x = THRUST - kq * u, force_y = drag_y + SIDE;
+    rates[0] = y[3];
+    rates[1] = y[4];
+    rates[2] = y[5];
+    rates[3] = (c * force_x - s * force_y) / MASS;
+    rates[4] = (s * force_x + c * force_y) / MASS;
+    rates[5] = (X_D * drag_y + TURN) / INERTIA;
+}
+
+/* A step of Dormand and Prince from y, whose rates are in k[0], to `new`, whose rates are in k[6]; the error. */
+static double plain_step(const double y[6], double h, double k[7][6], double new[6])
+{
+    double error = 0.0;
+    for (int i = 0; i < 6; i++)
+        new[i] = y[i] + h * (1.0 / 5 * k[0][i]);
+    rates_of(new, k[1]);
+    for (int i = 0; i < 6; i++)
+        new[i] = y[i] + h * (3.0 / 40 * k[0][i] + 9.0 / 40 * k[1][i]);
+    rates_of(new, k[2]);
+    for (int i = 0; i < 6; i++)
+        new[i] = y[i] + h * (44.0 / 45 * k[0][i] + -56.0 / 15 * k[1][i] + 32.0 / 9 * k[2][i]);
+    rates_of(new, k[3]);
+    for (int i = 0; i < 6; i++)
+        new[i] = y[i] + h * (19372.0 / 6561 * k[0][i] + -25360.0 / 2187 * k[1][i] + 64448.0 / 6561 * k[2][i] +
+                             -212.0 / 729 * k[3][i]);
+    rates_of(new, k[4]);
+    for (int i = 0; i < 6; i++)
+        new[i] = y[i] + h * (9017.0 / 3168 * k[0][i] + -355.0 / 33 * k[1][i] + 46732.0 / 5247 * k[2][i] +
+                             49.0 / 176 * k[3][i] + -5103.0 / 18656 * k[4][i]);
+    rates_of(new, k[5]);
+    for (int i = 0; i < 6; i++)
+        new[i] = y[i] + h * (35.0 / 384 * k[0][i] + 500.0 / 1113 * k[2][i] + 125.0 / 192 * k[3][i] +
+                             -2187.0 / 6784 * k[4][i] + 11.0 / 84 * k[5][i]);
+    rates_of(new, k[6]);
+    for (int i = 0; i < 6; i++)
+        error = larger(error, fabs(h * (71.0 / 57600 * k[0][i] + -71.0 / 16695 * k[2][i] + 71.0 / 1920 * k[3][i] +
+                                        -17253.0 / 339200 * k[4][i] + 22.0 / 525 * k[5][i] + -1.0 / 40 * k[6][i])));
+    return error;
+}
+
+static double time_of_plain_dormand_prince(struct stretch *end)
+{
+    const double duration = SUBSTEPS * STEP_SIZE;
+    double y[6] = {0.0}, new[6], k[7][6], time = 0.0, proposed = STEP_SIZE;
+    int64_t taken = 0;
+    const double begun = now();
+    rates_of(y, k[0]);
+    while (time < duration) {
+        const double left = duration - time, h = proposed < left ? proposed : left;
+        const bool last = h >= left;
+        const double error = plain_step(y, h, k, new);
+        const double factor = 0.9 * sqrt(sqrt(TOLERANCE / error));
+        if (!(error <= TOLERANCE)) {
+            proposed = h * larger(0.2, factor);
+            continue;
+        }
+        time = last ? duration : time + h;
+        memcpy(y, new, sizeof y);
+        memcpy(k[0], k[6], sizeof k[0]);
+        taken++;
+        proposed = h * (factor < 5.0 ? factor : 5.0);
+    }
+    *end = (struct stretch){.state = {y[0], y[1], y[2], y[3], y[4], y[5]}, .substeps = taken};
+    return (now() - begun) / (double)taken * 1e9;
+}
+
+static void demand_same(const struct stretch *plain, const struct stretch *kernel)
+{
+    demand(plain->substeps == kernel->substeps && memcmp(&plain->state, &kernel->state, sizeof plain->state) == 0,
+           "a plain loop that ends where the kernel does");
 }
 
 static int compared(const void *a, const void *b)
@@ -208,6 +291,7 @@ static void measure(struct host *host, bool with_substeps)
     static struct outcome_of_case cases[MOST_CASES];
     static const double sizes[] = {0.01, 0.1, 1.0};
     static const int steps[] = {100, 20, 4};
+    struct stretch with_libm[ADAPTIVE + 1], plain;
     int n = 0;
     for (int k = 0; k < SAMPLES; k++) {
         n = 0;
@@ -219,11 +303,15 @@ static void measure(struct host *host, bool with_substeps)
             snprintf(cases[n].name, sizeof cases[n].name, "substep_%s", METHODS[method - 1].name);
             cases[n].samples[k] = time_of_substeps(host, method);
             snprintf(cases[n + 1].name, sizeof cases[n].name, "libm_%s", METHODS[method - 1].name);
-            cases[n + 1].samples[k] = time_of_kernel_with_libm(method);
+            cases[n + 1].samples[k] = time_of_kernel_with_libm(method, &with_libm[method]);
         }
         if (with_substeps) {
             strcpy(cases[n].name, "plain_semi_implicit_euler");
-            cases[n++].samples[k] = time_of_plain_loop();
+            cases[n++].samples[k] = time_of_plain_euler(&plain);
+            demand_same(&plain, &with_libm[SEMI_IMPLICIT_EULER]);
+            strcpy(cases[n].name, "plain_adaptive");
+            cases[n++].samples[k] = time_of_plain_dormand_prince(&plain);
+            demand_same(&plain, &with_libm[ADAPTIVE]);
         }
     }
     for (int i = 0; i < n; i++)

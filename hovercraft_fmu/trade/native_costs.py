@@ -68,15 +68,14 @@ def measure() -> list[Cost]:
 
 
 def _substeps(found: Mapping[str, float]) -> list[Cost]:
-    costs = [
-        Cost(f"{method.name}: a sub-step", "ns", found[f"substep_{method.name}"], "the same with libm, -O3",
-             found[f"libm_{method.name}"])
-        for method in INTEGRATORS if method.integrate
-    ]  # fmt: skip
-    name = INTEGRATORS[0].name
-    plain = Cost(f"{name}: a sub-step", "ns", found[f"substep_{name}"], "plain C loop with libm, -O3",
-                 found[f"plain_{name}"])  # fmt: skip
-    return [plain, *costs]
+    """Each method beside the same C with libm; the first and the last beside plain loops, too."""
+    others = {"plain": "plain C loop with libm, -O3", "libm": "the same with libm, -O3"}
+    return [
+        Cost(f"{method.name}: a sub-step", "ns", found[f"substep_{method.name}"], text, found[f"{other}_{method.name}"])
+        for method in INTEGRATORS
+        for other, text in others.items()
+        if f"{other}_{method.name}" in found
+    ]
 
 
 def _calls(host: str, native: Mapping[str, float], python: Mapping[str, float]) -> list[Cost]:
