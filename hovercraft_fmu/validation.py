@@ -59,12 +59,13 @@ def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
 def validate_elsewhere(path: str | os.PathLike[str]) -> Iterator[Check]:
     """The checkers and hosts that others wrote, where they are installed; for the hovercraft FMU only."""
     path = Path(path)
-    toolbox = hosts.HOSTS["fmucontainer"]
+    others = hosts.hosts_of(path)
+    toolbox = others["fmucontainer"]
     what, missing = "fmutool -check: schema and semantics", toolbox.missing()
     version = "" if missing else toolbox.version()
     yield Check("fmu-manipulation-toolbox", version, what, [] if missing else _fmutool_problems(path), missing)
     expected = hosts.run_in("fmpy", path)
-    for host in hosts.HOSTS.values():
+    for host in others.values():
         if host.name != "fmpy":
             yield _host_check(host, path, expected)
 

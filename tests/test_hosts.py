@@ -1,20 +1,24 @@
 """The FMU in hosts that others wrote: the bits that fmpy gives, which are the bare model's."""
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from hovercraft_fmu.cli import commands
+from hovercraft_fmu.fmu import document
+from hovercraft_fmu.fmu.document import pages
 from hovercraft_fmu.fmu.interface import observe_motion
-from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, HOSTS, run_in
+from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, HOSTS, hosts_of, run_in
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.subcycling import advance
 from tests.conftest import ROOT
 
-TABLE = (ROOT / "hovercraft_fmu" / "fmu" / "documentation" / "checked.md").read_text(encoding="utf-8")
+DOCUMENTATION = ROOT / "hovercraft_fmu" / "fmu" / "documentation"
+TABLES = {"python": "checked.md", "native": "checked_native.md"}
 
 
 @pytest.mark.parametrize("name", HOSTS)
@@ -33,13 +37,29 @@ def _without_versions(table: str) -> list[list[str]]:
     return [[checker, what, result] for checker, _, what, result in rows]
 
 
-def test_the_table_is_what_the_command_prints(fmu: Path) -> None:
+def test_the_table_is_what_the_command_prints(each_fmu: Path, flavour: str) -> None:
     """Versions move on; checkers, what was run, and the results are those of the committed table."""
-    if missing := "".join(host.missing() for host in HOSTS.values()):
+    if missing := "".join(host.missing() for host in hosts_of(each_fmu).values()):
         pytest.skip(missing)
-    done = CliRunner().invoke(commands, ["validate", "--table", str(fmu)])
+    table = (DOCUMENTATION / TABLES[flavour]).read_text(encoding="utf-8")
+    done = CliRunner().invoke(commands, ["validate", "--table", str(each_fmu)])
     assert done.exit_code == 0, done.output
-    assert _without_versions(done.stdout) == _without_versions(TABLE)
-    assert TABLE in (ROOT / "README.md").read_text(encoding="utf-8")
-    assert all(row[-1] == "ok" for row in _without_versions(TABLE)[2:])
-    assert re.search(r"\| fmpy \| \d", TABLE)
+    assert _without_versions(done.stdout) == _without_versions(table)
+    assert table in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert all(row[-1] == "ok" for row in _without_versions(table)[2:])
+    assert re.search(r"\| fmpy \| \d", table)
+
+
+@pytest.mark.parametrize("native", [False, True])
+def test_the_page_shows_the_table_and_is_made_without_it(
+    native: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first build comes before the first check."""
+    host = "<td>no Python</td>" if native else "<td>LD_PRELOAD="
+    page = pages(native)["index.html"]
+    assert "Where it ran" in page
+    assert host in page
+    folder = tmp_path / "documentation"
+    shutil.copytree(DOCUMENTATION, folder, ignore=shutil.ignore_patterns("checked*.md"))
+    monkeypatch.setattr(document, "FOLDER", folder)
+    assert "Where it ran" not in pages(native)["index.html"]

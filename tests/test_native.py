@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 
 from hovercraft_fmu.fmu.description import NATIVE
 from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STEP_UNSTABLE
-from hovercraft_fmu.hosts import HOSTS, run_in
+from hovercraft_fmu.hosts import NATIVE_HOSTS, run_in
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, read_description, run_fmu, run_model
 from tests.blobs import with_word
@@ -77,7 +77,7 @@ def test_every_scene_and_method_is_close_to_the_bare_model(name: str, method: st
 def test_other_hosts_give_the_bits_that_fmpy_gives(native_fmu: Path) -> None:
     expected = run_in("fmpy", native_fmu)
     for name in ("libcosimpy", "ecospy", "fmucontainer", "C host"):
-        if missing := HOSTS[name].missing():
+        if missing := NATIVE_HOSTS[name].missing():
             pytest.skip(f"{name}: {missing}")
         assert run_in(name, native_fmu) == expected, name
 

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 from collections.abc import Callable, Mapping
 from importlib import metadata
 from pathlib import Path
@@ -24,6 +25,8 @@ OUTPUTS = tuple(variable.name for variable in VARIABLES if variable.causality ==
 INPUT_REFERENCES = [BY_NAME[name].reference for name in INPUTS]
 OUTPUT_REFERENCES = [BY_NAME[name].reference for name in OUTPUTS]
 COMPILERS = ("cc", "gcc", "clang")
+PYTHON_MODULE = "resources/slavemodule.txt"
+"""What tells an FMU that pythonfmu made: the name of its module."""
 
 
 class HostError(RuntimeError):
@@ -71,10 +74,13 @@ def python_library() -> str | None:
     return max(usable)[1] if usable else None
 
 
+def _missing_to_compile() -> str:
+    return "" if compiler() else f"no C compiler ({', '.join(COMPILERS)})"
+
+
 def _missing_for_c() -> str:
-    if not compiler():
-        return f"no C compiler ({', '.join(COMPILERS)})"
-    return "" if python_library() else "no shared library of Python (Debian: apt-get install libpython3-dev)"
+    library = "" if python_library() else "no shared library of Python (Debian: apt-get install libpython3-dev)"
+    return _missing_to_compile() or library
 
 
 HOSTS: Mapping[str, Host] = {
@@ -85,6 +91,14 @@ HOSTS: Mapping[str, Host] = {
                          _package("fmu_manipulation_toolbox").missing),
     "C host": Host("C host", lambda: f"LD_PRELOAD={python_library()}", _missing_for_c),
 }  # fmt: skip
+NATIVE_HOSTS: Mapping[str, Host] = {**HOSTS, "C host": Host("C host", lambda: "no Python", _missing_to_compile)}
+"""The same for a native FMU, which needs no Python beside it."""
+
+
+def hosts_of(fmu: Path) -> Mapping[str, Host]:
+    """The hosts for the flavour of an FMU."""
+    with zipfile.ZipFile(fmu) as archive:
+        return HOSTS if PYTHON_MODULE in archive.namelist() else NATIVE_HOSTS
 
 
 def run_in(host: str, fmu: Path) -> list[list[float]]:
@@ -201,7 +215,7 @@ def run_c(fmu: Path) -> list[list[float]]:
                    ",".join(map(str, OUTPUT_REFERENCES))]  # fmt: skip
         lines = "".join(" ".join(map(repr, controls)) + "\n" for controls in CONTROLS)
         env = {"PATH": os.defpath}
-        if Path(folder, "resources", "slavemodule.txt").exists():
+        if Path(folder, PYTHON_MODULE).exists():
             env["LD_PRELOAD"] = python_library() or ""
         done = subprocess.run(command, input=lines, env=env, capture_output=True, text=True, check=False)
     if done.returncode != 0:
