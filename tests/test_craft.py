@@ -1,10 +1,12 @@
 import math
+import re
 from dataclasses import FrozenInstanceError, fields
+from functools import cached_property
 
 import numpy as np
 import pytest
 
-from hovercraft_fmu.model.craft import PRESETS, Craft, preset
+from hovercraft_fmu.model.craft import DERIVED, PRESETS, Craft, preset
 
 
 def test_defaults_are_the_textbook_craft() -> None:
@@ -54,6 +56,44 @@ def test_a_batch_is_checked_craft_by_craft() -> None:
         Craft(mass=np.array([1.0, -2.0, 3.0]))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="thrust_max"):
         Craft(thrust_max=np.array([1.0, -2.0]))  # type: ignore[arg-type]
+
+
+THICK_AIR = {"height": 1.0, "air_density": 1e308, "drag_coefficient": 5.0}
+OUT_OF_RANGE: dict[str, dict[str, float]] = {
+    "projected_area = inf m2": {"length": 1e200, "width": 1e200, "height": 1e200},
+    "drag_factor = inf kg/m": {"air_density": 1e300, "drag_coefficient": 1e300},
+    "drag_factor = nan kg/m": {"air_density": 1e308, "drag_coefficient": 0.0},
+    "drag_factor_ahead = inf kg/m": {**THICK_AIR, "length": 1e-300, "width": 1.0},
+    "drag_factor_abeam = inf kg/m": {**THICK_AIR, "length": 1.0, "width": 1e-300},
+    "spin_drag_factor = inf kg.m2": {"length": 1e77, "rotational_drag": 1.0},
+    "spin_drag_factor = nan kg.m2": {"length": 1e80},
+    "friction_force = inf N": {"skirt_friction": 1e200, "mass": 1e200},
+    "thruster_moment = inf N.m": {"steering_force": 1e308},
+    "drag_rate = inf 1/kg": {"mass": 1e-320},
+    "spin_rate = inf 1": {"inertia": 1e-200, "drag_center_fraction": 0.0, "air_density": 1e120, "rotational_drag": 1.0},
+}  # fmt: skip
+"""What a craft's derived value comes to, and a craft that has it; each of its parameters is possible alone."""
+
+
+@pytest.mark.parametrize("what", OUT_OF_RANGE)
+def test_a_derived_value_out_of_range_is_named(what: str) -> None:
+    name = what.split()[0]
+    parts = {name: parts for name, _, parts in DERIVED}[name]
+    with pytest.raises(ValueError, match=rf"^{re.escape(what)}: must be a finite number; it is made of {parts}$"):
+        Craft(**OUT_OF_RANGE[what])  # type: ignore[arg-type]
+
+
+def test_every_derived_number_is_checked() -> None:
+    numbers = {name for name, value in vars(Craft).items() if isinstance(value, cached_property)}
+    assert numbers - {"plain_drag", "rubs"} == {name for name, _, _ in DERIVED}
+    # a finite length times at most a half is finite
+    assert {what.split()[0] for what in OUT_OF_RANGE} == {name for name, _, _ in DERIVED} - {"drag_center"}
+
+
+def test_derived_values_of_a_batch_are_checked_craft_by_craft() -> None:
+    heights = np.array([1.0, 1e200, 5.0])
+    with np.errstate(over="ignore"), pytest.raises(ValueError, match=r"^projected_area = inf m2: must be a finite"):
+        Craft(length=1e200, height=heights)  # type: ignore[arg-type]
 
 
 def test_frozen() -> None:

@@ -75,6 +75,11 @@ def _tuned_to_the_impossible(instance: Any) -> None:
     instance.doStep(0.1, 0.1)
 
 
+def _tuned_out_of_range(instance: Any) -> None:
+    put(instance, air_density=1e305)
+    instance.doStep(0.1, 0.1)
+
+
 def _thrown_out_of_range(instance: Any) -> None:
     put(instance, air_density=1e300)
     instance.doStep(0.1, 0.1)
@@ -90,6 +95,10 @@ FAULTS: dict[str, tuple[Callable[[Any], object], str]] = {
     "tunable nan": (lambda i: put(i, air_density=math.nan), "air_density = nan: must be a finite number"),
     "tunable impossible": (lambda i: put(i, air_density=-1.0), "air_density = -1.0: must not be negative"),
     "tunables that contradict": (_tuned_to_the_impossible, "thrust_min = 20.0 N: must not be above thrust_max = 10.0"),
+    "tunables out of range together": (
+        _tuned_out_of_range,
+        "spin_drag_factor = nan kg.m2: must be a finite number; it is made of air_density, drag_coefficient, height, ",
+    ),
     "fixed": (lambda i: put(i, mass=50.0), "mass = 50.0: must not be set in state 'step mode' (fixed parameter)"),
     "fixed enumeration": (
         lambda i: i.setInteger([reference("integrator")], [1]),
@@ -174,6 +183,65 @@ def test_both_flavours_warn_in_the_same_words(values: dict[str, float], fmu: Pat
             said.append(messages)
     assert said[0] == said[1]
     assert len(said[0]) == 2
+
+
+OUT_OF_RANGE: dict[str, tuple[dict[str, float], str]] = {
+    "projected_area": (
+        {"length": 1e200, "width": 1e200, "height": 1e200},
+        "projected_area = inf m2: must be a finite number; it is made of length, width, height",
+    ),
+    "drag_rate": ({"mass": 1e-320}, "drag_rate = inf 1/kg: must be a finite number; it is made of mass, inertia,"),
+    "friction_force": (
+        {"mass": 1e200, "skirt_friction": 1e200},
+        "friction_force = inf N: must be a finite number; it is made of skirt_friction, mass, gravity",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OUT_OF_RANGE)
+def test_both_flavours_refuse_a_craft_out_of_range_in_the_same_words(name: str, fmu: Path, native_fmu: Path) -> None:
+    """Each of its parameters is possible alone; together they are looked at when they are first used."""
+    values, message = OUT_OF_RANGE[name]
+    said = []
+    for each in (fmu, native_fmu):
+        with one(each) as (instance, messages):
+            put(instance, **values)
+            with pytest.raises(FMICallException):
+                instance.getReal([reference("speed")])
+            said.append(list(messages))
+    assert said[0] == said[1]
+    assert len(said[0]) == 1
+    assert message in said[0][0]
+
+
+WATCHED_OUT_OF_RANGE: dict[str, dict[str, float]] = {
+    "stability_number": {"mass": 1e-300, "inertia": 1e-300, "air_density": 1e10, "velocity.yaw_rate": 1.0},
+    "rotation_per_substep": {"step_size": 1e300, "air_density": 1e-100, "velocity.yaw_rate": 1e100,
+                             "mass": 1e-300, "inertia": 5e-300, "rotational_drag": 1.0},
+}  # fmt: skip
+"""Where drag_implicit, which never diverges, leaves the motion finite."""
+
+
+@pytest.mark.parametrize("name", WATCHED_OUT_OF_RANGE)
+def test_both_flavours_refuse_a_step_whose_watched_values_overflow(name: str, fmu: Path, native_fmu: Path) -> None:
+    said = []
+    values = {key.replace(".", "__"): value for key, value in WATCHED_OUT_OF_RANGE[name].items()}
+    step = values.get("step_size", 0.001)
+    for each in (fmu, native_fmu):
+        with one(each) as (instance, messages):
+            instance.setInteger([reference("integrator")], [2])
+            put(instance, **values)
+            start(instance)
+            before = get(instance, *STATES)
+            with pytest.raises(FMICallException):
+                instance.doStep(0.0, step)
+            assert get(instance, *STATES) == before
+            said.append(list(messages))
+    assert said[0] == said[1]
+    assert said[0] == [
+        f"{name} = inf after 0.0 s: must stay a finite number; the step was refused and the state of 0.0 s stands; "
+        "the motion is out of range"
+    ]
 
 
 @pytest.mark.parametrize(

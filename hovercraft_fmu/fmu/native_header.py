@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import fields
 
-from ..model.craft import NOT_NEGATIVE, POSITIVE, Craft
+from ..model.craft import DERIVED, NOT_NEGATIVE, POSITIVE, Craft
 from ..model.integrators import INTEGRATORS
 from .description import guid
 from .interface import (
@@ -81,6 +81,13 @@ struct craft_field {{
     size_t offset;          /* in struct craft */
 }};
 
+struct derived_value {{
+    const char *name;
+    const char *unit;
+    const char *parts;      /* what it is worked out of */
+    size_t offset;          /* in struct derived */
+}};
+
 static const char *const PHASE_NAMES[] = {{{phase_names}}};
 static const struct variable VARIABLES[] = {{
 {variables}
@@ -90,6 +97,9 @@ static const struct method METHODS[] = {{
 }};
 static const struct craft_field CRAFT_FIELDS[] = {{
 {craft_fields}
+}};
+static const struct derived_value DERIVED[] = {{
+{derived}
 }};
 static const unsigned INPUTS[] = {{{inputs}}};
 static const unsigned STATES[] = {{{states}}};
@@ -140,6 +150,10 @@ def variables_header(build: str) -> str:
         ),
         craft_fields="\n".join(
             f"    {{{constant(field.name)}, offsetof(struct craft, {field.name})}}," for field in fields(Craft)
+        ),
+        derived="\n".join(
+            f"    {{{_quoted(name)}, {_quoted(unit)}, {_quoted(parts)}, offsetof(struct derived, {name})}},"
+            for name, unit, parts in DERIVED
         ),
         inputs=_constants(INPUTS),
         states=_constants(STATES),

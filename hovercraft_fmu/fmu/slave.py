@@ -152,14 +152,16 @@ class HovercraftSlave(WrappedSlave):
                 stretch = advance(self._state, controls, craft, step_size, self._settings, proposed=self._proposed)
             except NonFiniteError as error:
                 self._refuse_motion(error)
-            self._state, n, drag, rotation, self._proposed = stretch
+            stability, rotation = stability_number(stretch.drag, stretch.rotation, craft), stretch.rotation
+            if not stability < math.inf:
+                self._refuse_watched(stability, rotation)
+            self._state, n, _, _, self._proposed = stretch
             self._controls, self._craft, self._tuned = controls, craft, False
             self._time = current_time + step_size
             self._integers[SUBSTEPS] += n
             self._stale = True
             if self._integers[SUBSTEPS] > SUBSTEPS_MAX:
                 self._stop_counter()
-            stability = stability_number(drag, rotation, craft)
             if stability > self._stability:
                 self._stability = stability
             if rotation > self._rotation:
@@ -223,6 +225,17 @@ class HovercraftSlave(WrappedSlave):
             f"the state of {self._time!r} s stands; the motion is too fast for sub-steps of {error.substep!r} s: "
             "set a smaller step_size"
         ) from error
+
+    def _refuse_watched(self, stability: float, rotation: float) -> NoReturn:
+        """What is watched over a step may overflow where the motion just does not; an infinite rotation leaves no
+        finite stability number.
+        """
+        watched = zip(WATCHED, (stability, rotation), strict=True)
+        name, value = next((name, value) for name, value in reversed(list(watched)) if not math.isfinite(value))
+        raise ValueError(
+            f"{name} = {value!r} after {self._time!r} s: must stay a finite number; the step was refused and the state "
+            f"of {self._time!r} s stands; the motion is out of range"
+        )
 
     # ---- variables
 

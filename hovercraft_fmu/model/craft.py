@@ -18,6 +18,19 @@ DRAG_AREAS = (
     ("directional", "The area of the box length x width x height as the air at the drag point sees it"),
 )
 """The choices of drag_area, from 1: name, description."""
+DERIVED = (
+    ("projected_area", "m2", "length, width, height"),
+    ("drag_factor", "kg/m", "air_density, projected_area, drag_coefficient"),
+    ("drag_factor_ahead", "kg/m", "air_density, width, height, drag_coefficient"),
+    ("drag_factor_abeam", "kg/m", "air_density, length, height, drag_coefficient"),
+    ("spin_drag_factor", "kg.m2", "air_density, drag_coefficient, height, length, rotational_drag"),
+    ("friction_force", "N", "skirt_friction, mass, gravity"),
+    ("drag_center", "m", "drag_center_fraction, length"),
+    ("thruster_moment", "N.m", "length, steering_force"),
+    ("drag_rate", "1/kg", "mass, inertia, drag_center"),
+    ("spin_rate", "1", "spin_drag_factor, inertia"),
+)
+"""The derived numbers, in the order in which they are checked: name, unit, what they are worked out of."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +38,9 @@ class Craft:
     """The constants of one hovercraft; a batch of craft has numpy arrays in the fields that differ.
 
     Raises:
-        ValueError: names the parameter, the value and the rule.
+        ValueError: names the parameter, or the derived value that is not a finite number, the value and the rule.
 
-    Derived values are worked out when they are first asked for; a communication step asks for them every time.
+    Derived values are worked out once; a communication step asks for them every time.
     """
 
     mass: float = 100.0
@@ -71,6 +84,15 @@ class Craft:
                 raise ValueError(
                     f"thrust_min = {self.thrust_min!r} N: must not be above thrust_max = {self.thrust_max!r} N"
                 )
+        self._check_derived()
+
+    def _check_derived(self) -> None:
+        for name, unit, parts in DERIVED:
+            derived = getattr(self, name)
+            for value in (derived,) if isinstance(derived, float) else _items(derived):
+                if not math.isfinite(value):
+                    rule = f"must be a finite number; it is made of {parts}"
+                    raise ValueError(f"{name} = {float(value)!r} {unit}: {rule}")
 
     @cached_property
     def projected_area(self) -> float:

@@ -88,6 +88,19 @@ enum verdict instance_initialize(struct instance *instance, const char *call)
     return FINE;
 }
 
+static enum verdict check_derived(struct instance *instance, const struct craft *craft)
+{
+    const struct derived derived = kernel_derived(craft);
+    for (unsigned i = 0; i < sizeof DERIVED / sizeof *DERIVED; i++) {
+        const struct derived_value *value = &DERIVED[i];
+        const double found = *(const double *)(const void *)((const char *)&derived + value->offset);
+        if (!isfinite(found))
+            return instance_say(instance, REFUSED, "%s = %r %s: must be a finite number; it is made of %s", value->name,
+                                found, value->unit, value->parts);
+    }
+    return FINE;
+}
+
 /* The craft that the parameters make. */
 static enum verdict make_craft(struct instance *instance, struct craft *craft)
 {
@@ -103,7 +116,7 @@ static enum verdict make_craft(struct instance *instance, struct craft *craft)
     if (craft->thrust_max - craft->thrust_min < 0.0)
         return instance_say(instance, REFUSED, "thrust_min = %r N: must not be above thrust_max = %r N",
                             craft->thrust_min, craft->thrust_max);
-    return FINE;
+    return check_derived(instance, craft);
 }
 
 static struct controls inputs_of(const double *reals)
@@ -132,7 +145,7 @@ static enum verdict take_up_start_values(struct instance *instance)
     };
     now->controls = inputs_of(now->reals);
     get_state(now->reals, &now->state);
-    now->reals[V_PROJECTED_AREA] = kernel_projected_area(&craft);
+    now->reals[V_PROJECTED_AREA] = kernel_derived(&craft).projected_area;
     now->tuned = false;
     now->moved = now->acted = true;
     return FINE;
@@ -198,6 +211,21 @@ static enum verdict refuse_step(struct instance *instance, enum outcome outcome,
                             "step = %r s: must not fall below 1e-12 s to meet tolerance = %r; set a larger tolerance",
                             stretch->substep, settings->tolerance);
     return refuse_motion(instance, stretch);
+}
+
+/* What is watched over a step may overflow where the motion just does not; an infinite rotation leaves no finite
+   stability number. */
+static enum verdict check_watched(struct instance *instance, double stability, double rotation)
+{
+    const bool turns = !isfinite(rotation);
+    const double time = instance->now.time;
+    if (isfinite(stability))
+        return FINE;
+    return instance_say(instance, REFUSED,
+                        "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
+                        "stands; the motion is out of range",
+                        VARIABLES[turns ? V_ROTATION_PER_SUBSTEP : V_STABILITY_NUMBER].name,
+                        turns ? rotation : stability, time, time);
 }
 
 /* Whether this warning was not yet given; then it is, now. */
@@ -302,6 +330,9 @@ static enum verdict take_step(struct instance *instance, double point, double st
         kernel_advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
     if (outcome != ADVANCED)
         return refuse_step(instance, outcome, step, &stretch);
+    const double stability = kernel_stability_number(stretch.drag, stretch.rotation, &craft);
+    if (check_watched(instance, stability, stretch.rotation) == REFUSED)
+        return REFUSED;
     now->state = stretch.state;
     now->proposed = stretch.proposed;
     now->controls = end;
@@ -309,7 +340,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->tuned = false;
     now->time = point + step;
     now->moved = now->acted = true;
-    now->stability = larger(now->stability, kernel_stability_number(stretch.drag, stretch.rotation, &craft));
+    now->stability = larger(now->stability, stability);
     now->rotation = larger(now->rotation, stretch.rotation);
     now->reals[V_THRUST] = end.thrust; /* a ramp goes on from here */
     now->reals[V_PORT_THRUSTER] = end.port;

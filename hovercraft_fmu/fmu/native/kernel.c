@@ -55,14 +55,14 @@ static inline double smaller(double a, double b)
 
 /* ---- craft.py */
 
-double kernel_projected_area(const struct craft *craft)
+static double projected_area(const struct craft *craft)
 {
     return (craft->length + craft->width) / 2.0 * craft->height;
 }
 
 static double drag_factor(const struct craft *craft)
 {
-    return 0.5 * craft->air_density * kernel_projected_area(craft) * craft->drag_coefficient;
+    return 0.5 * craft->air_density * projected_area(craft) * craft->drag_coefficient;
 }
 
 static double drag_factor_ahead(const struct craft *craft)
@@ -105,6 +105,33 @@ static double drag_center(const struct craft *craft)
 static double thruster_moment(const struct craft *craft)
 {
     return 0.5 * craft->length * craft->steering_force;
+}
+
+static double drag_rate(const struct craft *craft)
+{
+    const double x_d = drag_center(craft);
+    return 2.0 * (1.0 / craft->mass + x_d * x_d / craft->inertia);
+}
+
+static double spin_rate(const struct craft *craft)
+{
+    return 2.0 * spin_drag_factor(craft) / craft->inertia;
+}
+
+struct derived kernel_derived(const struct craft *craft)
+{
+    return (struct derived){
+        .projected_area = projected_area(craft),
+        .drag_factor = drag_factor(craft),
+        .drag_factor_ahead = drag_factor_ahead(craft),
+        .drag_factor_abeam = drag_factor_abeam(craft),
+        .spin_drag_factor = spin_drag_factor(craft),
+        .friction_force = friction_force(craft),
+        .drag_center = drag_center(craft),
+        .thruster_moment = thruster_moment(craft),
+        .drag_rate = drag_rate(craft),
+        .spin_rate = spin_rate(craft),
+    };
 }
 
 /* ---- dynamics.py */
@@ -721,8 +748,5 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
 
 double kernel_stability_number(double drag, double rotation, const struct craft *craft)
 {
-    const double x_d = drag_center(craft);
-    const double drag_rate = 2.0 * (1.0 / craft->mass + x_d * x_d / craft->inertia);
-    const double spin_rate = 2.0 * spin_drag_factor(craft) / craft->inertia;
-    return drag * drag_rate + rotation * spin_rate;
+    return drag * drag_rate(craft) + rotation * spin_rate(craft);
 }

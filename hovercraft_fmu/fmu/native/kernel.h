@@ -31,6 +31,12 @@ struct craft {
     double rotational_drag;      /* 1 */
 };
 
+/* What is worked out of the constants; the caller has checked that each is finite. Units and formulas: craft.py. */
+struct derived {
+    double projected_area, drag_factor, drag_factor_ahead, drag_factor_abeam, spin_drag_factor, friction_force;
+    double drag_center, thruster_moment, drag_rate, spin_rate;
+};
+
 struct state {
     double x, y;     /* m */
     double heading;  /* rad, unwrapped */
@@ -84,7 +90,7 @@ static inline double larger(double a, double b)
     return b > a ? b : a;
 }
 
-double kernel_projected_area(const struct craft *craft);
+struct derived kernel_derived(const struct craft *craft);
 
 struct controls kernel_saturate(const struct controls *controls, const struct craft *craft);
 struct controls kernel_controls_at(const struct drive *drive, double time);
