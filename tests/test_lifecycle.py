@@ -240,7 +240,7 @@ def test_both_flavours_refuse_a_step_whose_watched_values_overflow(name: str, fm
     assert said[0] == said[1]
     assert said[0] == [
         f"{name} = inf after 0.0 s: must stay a finite number; the step was refused and the state of 0.0 s stands; "
-        "the motion is out of range"
+        f"the motion is too fast for sub-steps of {step!r} s: set a smaller step_size"
     ]
 
 

@@ -234,7 +234,8 @@ class HovercraftSlave(WrappedSlave):
         name, value = next((name, value) for name, value in reversed(list(watched)) if not math.isfinite(value))
         raise ValueError(
             f"{name} = {value!r} after {self._time!r} s: must stay a finite number; the step was refused and the state "
-            f"of {self._time!r} s stands; the motion is out of range"
+            f"of {self._time!r} s stands; the motion is too fast for sub-steps of {self._settings.step_size!r} s: "
+            "set a smaller step_size"
         )
 
     # ---- variables

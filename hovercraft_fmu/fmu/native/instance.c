@@ -223,9 +223,9 @@ static enum verdict check_watched(struct instance *instance, double stability, d
         return FINE;
     return instance_say(instance, REFUSED,
                         "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
-                        "stands; the motion is out of range",
+                        "stands; the motion is too fast for sub-steps of %r s: set a smaller step_size",
                         VARIABLES[turns ? V_ROTATION_PER_SUBSTEP : V_STABILITY_NUMBER].name,
-                        turns ? rotation : stability, time, time);
+                        turns ? rotation : stability, time, time, instance->now.settings.step_size);
 }
 
 /* Whether this warning was not yet given; then it is, now. */
