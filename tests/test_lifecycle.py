@@ -251,6 +251,11 @@ def test_both_flavours_refuse_a_step_whose_watched_values_overflow(name: str, fm
         ((lambda i: i.terminate(),), "fmi2Terminate in state 'instantiated'"),
         ((lambda i: i.exitInitializationMode(),), "fmi2ExitInitializationMode in state 'instantiated'"),
         ((lambda i: i.setupExperiment(startTime=math.nan),), "startTime = nan s: must be a finite number"),
+        (
+            (lambda i: i.setupExperiment(startTime=2.0, stopTime=1.0),),
+            "stopTime = 1.0 s: must not be before startTime = 2.0 s",
+        ),
+        ((lambda i: i.setupExperiment(stopTime=math.nan),), "stopTime = nan s: must not be before startTime"),
         ((lambda i: put(i, mass=0.0),), "mass = 0.0: must be greater than 0"),
         ((lambda i: put(i, step_size=-1.0),), "step_size = -1.0 s: must be a finite number greater than 0"),
         ((lambda i: put(i, velocity__x=math.nan),), "velocity.x = nan: must be a finite number"),
@@ -601,6 +606,28 @@ def test_outputs_belong_to_the_point_after_set_state_and_reset(instance: Any) ->
     instance.reset()
     start(instance)
     assert get(instance, "applied.thrust", "applied.steering", *MOTION) == [5.0, 0.0, 0.0, 0.0, 0.0]
+
+
+def test_no_step_leads_past_the_stop_time(instance: Any, messages: list[str]) -> None:
+    """As FMI 2.0 demands of `stopTime`; a rounding of the host's does not count, and a reset forgets it."""
+    instance.setupExperiment(stopTime=1.0)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    instance.doStep(0.0, 0.9)
+    content = instance.serializeFMUstate(instance.getFMUstate())
+    for restored in (False, True):
+        if restored:
+            instance.reset()
+            instance.setFMUstate(instance.deSerializeFMUstate(content))
+        before = everything(instance)
+        with pytest.raises(FMICallException):
+            instance.doStep(0.9, 0.2)
+        assert messages[-1] == ("communicationStepSize = 0.2 s from 0.9 s: must not lead past stopTime = 1.0 s")
+        assert everything(instance) == before
+    instance.doStep(0.9, 0.1 + 1e-10)
+    instance.reset()
+    start(instance)
+    instance.doStep(0.0, 2.0)
 
 
 def test_a_start_time_other_than_zero(instance: Any) -> None:

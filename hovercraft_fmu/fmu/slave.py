@@ -43,7 +43,8 @@ from .wrapper import Fmi2Status, WrappedSlave, called_by_wrapper
 HELD = 1e-9
 """Relative to the limit (at least 1): an input beyond it by less is a rounding of the host's interpolation."""
 SAME_TIME = 1e-9
-"""Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step."""
+"""Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step, or past
+the stop time."""
 
 BY_REFERENCE = {variable.reference: variable for variable in VARIABLES}
 REALS = frozenset(v.reference for v in VARIABLES if v.kind == "Real")
@@ -100,6 +101,7 @@ class HovercraftSlave(WrappedSlave):
         self._reals = {reference: float(BY_REFERENCE[reference].start or 0.0) for reference in REALS - ACTION_SET}
         self._integers = {reference: int(BY_REFERENCE[reference].start or 0) for reference in INTEGERS}
         self._time = 0.0
+        self._stop_time = math.inf  # with the experiment; the standard forbids to step past it
         self._state = State()
         # with these the last step was made, and from these the outputs are calculated
         self._controls = Controls()
@@ -121,7 +123,10 @@ class HovercraftSlave(WrappedSlave):
             raise ValueError(f"startTime = {start_time!r} s: must be a finite number")
         if tolerance is not None:
             check_tolerance(tolerance)
-        self._time, self._hosts_tolerance = start_time, tolerance
+        stop_time = math.inf if stop_time is None else stop_time
+        if not stop_time >= start_time:
+            raise ValueError(f"stopTime = {stop_time!r} s: must not be before startTime = {start_time!r} s")
+        self._time, self._stop_time, self._hosts_tolerance = start_time, stop_time, tolerance
 
     @called_by_wrapper
     def enter_initialization_mode(self) -> None:
@@ -144,6 +149,12 @@ class HovercraftSlave(WrappedSlave):
             if current_time != time and not abs(current_time - time) <= SAME_TIME * max(1.0, abs(time)):
                 raise ValueError(
                     f"currentCommunicationPoint = {current_time!r} s: must be where the last step ended, {time!r} s"
+                )
+            stop_time = self._stop_time
+            if current_time + step_size - stop_time > SAME_TIME * max(1.0, abs(stop_time)):
+                raise ValueError(
+                    f"communicationStepSize = {step_size!r} s from {current_time!r} s: must not lead past "
+                    f"stopTime = {stop_time!r} s"
                 )
             reals = self._reals
             controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD], reals[WIND_X], reals[WIND_Y])
@@ -383,6 +394,7 @@ class HovercraftSlave(WrappedSlave):
             "build": self.build,
             "phase": self._phase.name,
             "time": self._time,
+            "stop_time": self._stop_time,
             "reals": [self._reals[reference] for reference in KEPT_REALS],
             "integers": [self._integers[reference] for reference in sorted(INTEGERS)],
             "state": list(self._state if self._started() else (self._reals[r] for r in STATE_REFERENCES)),
@@ -399,7 +411,7 @@ class HovercraftSlave(WrappedSlave):
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self._check_build(state)
         self._phase = Phase[state["phase"]]
-        self._time = state["time"]
+        self._time, self._stop_time = state["time"], state["stop_time"]
         self._reals.update(zip(KEPT_REALS, state["reals"], strict=True))
         self._integers.update(zip(sorted(INTEGERS), state["integers"], strict=True))
         self._state = State(*state["state"])

@@ -292,8 +292,8 @@ static fmi2Status called(struct bytes *bytes, struct world *world, fmi2Component
     double values[3];
     switch (a_byte(bytes) % CALLS) {
     case 0:
-        values[0] = a_double(bytes), values[1] = a_double(bytes);
-        return fmi2SetupExperiment(*craft, a_byte(bytes) & 1, values[0], values[1], fmi2False, 0.0);
+        values[0] = a_double(bytes), values[1] = a_double(bytes), values[2] = a_double(bytes);
+        return fmi2SetupExperiment(*craft, a_byte(bytes) & 1, values[0], values[1], a_byte(bytes) < 64, values[2]);
     case 1:
     case 2:
         return fmi2EnterInitializationMode(*craft);

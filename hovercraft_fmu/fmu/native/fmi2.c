@@ -1,5 +1,6 @@
 /* The FMI 2.0 co-simulation interface: it translates, and checks pointers; all else is the instance's. */
 
+#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -144,9 +145,8 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean tolerance_de
                                fmi2Real start_time, fmi2Boolean stop_time_defined, fmi2Real stop_time)
 {
     struct component *c = component;
-    (void)stop_time_defined, (void)stop_time;
     return c ? status_of(instance_set_up(&c->instance, "fmi2SetupExperiment", start_time, tolerance_defined != 0,
-                                         tolerance))
+                                         tolerance, stop_time_defined ? stop_time : INFINITY))
              : fmi2Error;
 }
 

@@ -41,7 +41,7 @@ bool instance_started(const struct instance *instance)
 
 void instance_reset(struct instance *instance)
 {
-    const struct content empty = {.phase = INSTANTIATED, .moved = true, .acted = true};
+    const struct content empty = {.phase = INSTANTIATED, .stop_time = INFINITY, .moved = true, .acted = true};
     instance->now = empty;
     instance->last_step = FINE;
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
@@ -67,7 +67,7 @@ static enum verdict check_tolerance(struct instance *instance, double tolerance)
 }
 
 enum verdict instance_set_up(struct instance *instance, const char *call, double start_time, bool tolerance_given,
-                             double tolerance)
+                             double tolerance, double stop_time)
 {
     if (instance_require(instance, call, INSTANTIATED) == REFUSED)
         return REFUSED;
@@ -75,7 +75,11 @@ enum verdict instance_set_up(struct instance *instance, const char *call, double
         return instance_say(instance, REFUSED, "startTime = %r s: must be a finite number", start_time);
     if (tolerance_given && check_tolerance(instance, tolerance) == REFUSED)
         return REFUSED;
+    if (!(stop_time >= start_time))
+        return instance_say(instance, REFUSED, "stopTime = %r s: must not be before startTime = %r s", stop_time,
+                            start_time);
     instance->now.time = start_time;
+    instance->now.stop_time = stop_time;
     instance->now.hosts_tolerance = tolerance_given ? tolerance : 0.0;
     return FINE;
 }
@@ -171,13 +175,17 @@ enum verdict instance_terminate(struct instance *instance, const char *call)
 
 static enum verdict check_step(struct instance *instance, double point, double step)
 {
-    const double time = instance->now.time;
+    const double time = instance->now.time, stop_time = instance->now.stop_time;
     if (!(0.0 < step && step < INFINITY))
         return instance_say(instance, REFUSED,
                             "communicationStepSize = %r s: must be a finite number greater than 0", step);
     if (point != time && !(fabs(point - time) <= SAME_TIME * larger(1.0, fabs(time))))
         return instance_say(instance, REFUSED,
                             "currentCommunicationPoint = %r s: must be where the last step ended, %r s", point, time);
+    if (point + step - stop_time > SAME_TIME * larger(1.0, fabs(stop_time)))
+        return instance_say(instance, REFUSED,
+                            "communicationStepSize = %r s from %r s: must not lead past stopTime = %r s", step, point,
+                            stop_time);
     return FINE;
 }
 

@@ -22,6 +22,7 @@ typedef void teller(void *sink, enum verdict verdict, const char *message);
 struct content {
     enum phase phase;
     double time;                      /* s, where the last step ended */
+    double stop_time;                 /* s, given with the experiment; else infinite */
     double reals[VARIABLE_COUNT];     /* what is read, by value reference */
     int32_t integers[VARIABLE_COUNT];
     double rates[INPUT_COUNT];        /* per s, of the inputs */
@@ -56,8 +57,9 @@ enum verdict instance_say(struct instance *instance, enum verdict verdict, const
 enum verdict instance_require(struct instance *instance, const char *call, enum phase phase);
 bool instance_started(const struct instance *instance);
 
+/* `stop_time` is infinite where there is none. */
 enum verdict instance_set_up(struct instance *instance, const char *call, double start_time, bool tolerance_given,
-                             double tolerance);
+                             double tolerance, double stop_time);
 enum verdict instance_initialize(struct instance *instance, const char *call);
 enum verdict instance_go(struct instance *instance, const char *call);
 enum verdict instance_step(struct instance *instance, const char *call, double point, double step);

@@ -10,7 +10,7 @@
 
 #include "instance.h"
 
-enum { VERSION = 1, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
+enum { VERSION = 2, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
 static const char MAGIC[] = "HOVERFMU";
 
 enum direction { MEASURE, WRITE, READ };
@@ -103,6 +103,7 @@ static void exchange(struct cursor *cursor, struct content *c)
     exchange_double(cursor, &c->settings.step_size);
     exchange_double(cursor, &c->settings.tolerance);
     exchange_double(cursor, &c->time);
+    exchange_double(cursor, &c->stop_time);
     for (unsigned i = 0; i < VARIABLE_COUNT; i++)
         if (VARIABLES[i].start_given && VARIABLES[i].kind == REAL && !is_state(i))
             exchange_double(cursor, &c->reals[i]);
