@@ -536,6 +536,14 @@ def test_what_is_logged(library: Any, guid: bytes) -> None:
     assert told() == []
     assert choose(1, b"logAll") == OK
     assert told() == [WARNING, ERROR]
+    assert choose(1, b"logStatusError") == OK  # the standard: then only these
+    assert told() == [ERROR]
+    assert choose(1, b"logStatusWarning") == OK
+    assert told() == [WARNING]
+    assert choose(0, b"logStatusError") == OK
+    assert told() == [WARNING]
+    assert choose(1, b"logStatusWarning", b"logStatusError") == OK
+    assert told() == [WARNING, ERROR]
     assert choose(1, b"logStatusWarning", b"log%s") == ERROR
     names = "logStatusWarning, logStatusError, logAll"
     assert callbacks.said[-1][2] == f"log category 'log?s': must be one of {names}"

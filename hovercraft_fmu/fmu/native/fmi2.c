@@ -70,7 +70,7 @@ const char *fmi2GetVersion(void)
     return fmi2Version;
 }
 
-/* Without categories all of them. */
+/* Switched on, only these categories are told; switched off, these no more. Without categories it is all of them. */
 fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean on, size_t n, const fmi2String categories[])
 {
     struct component *c = component;
@@ -89,10 +89,8 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean on, size_t n
         warnings = warnings || all || warning;
         errors = errors || all || error;
     }
-    if (warnings)
-        c->warnings = on;
-    if (errors)
-        c->errors = on;
+    c->warnings = on ? warnings : c->warnings && !warnings;
+    c->errors = on ? errors : c->errors && !errors;
     return fmi2OK;
 }
 
