@@ -138,6 +138,27 @@ def test_plain_cc_compiles_the_sources_without_a_warning(archive: dict[str, byte
         assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.parametrize(
+    ("options", "prefix"),
+    [
+        ([], ""),
+        ([f"-DFMI2_FUNCTION_PREFIX={NAME}_"], f"{NAME}_"),
+        ([f"-DFMI2_FUNCTION_PREFIX={NAME}_", "-DFMI2_OVERRIDE_FUNCTION_PREFIX"], ""),
+    ],
+)
+def test_a_host_that_links_the_sources_chooses_the_prefix_of_the_functions(
+    options: list[str], prefix: str, archive: dict[str, bytes], tmp_path: Path
+) -> None:
+    """As the standard has it for FMUs in C."""
+    for name, content in archive.items():
+        if name.startswith("sources/"):
+            (tmp_path / Path(name).name).write_bytes(content)
+    command = [c_compiler(), "-std=c11", "-Wall", "-Wextra", "-Werror", *options, "-c", "fmi2.c"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    printed = subprocess.run(["nm", "fmi2.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert set(re.findall(r" T (\w+)", printed)) == {f"{prefix}{name}" for name in FUNCTIONS}
+
+
 def test_nothing_is_shared_between_instances_or_with_other_libraries(archive: dict[str, bytes], tmp_path: Path) -> None:
     """No symbol of any object file lies in memory that can be written; each that a linker sees has a prefix.
 

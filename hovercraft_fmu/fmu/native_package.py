@@ -25,7 +25,18 @@ FMI_HEADERS = tuple(
     Path(fmpy.__file__).parent / "c-code" / name
     for name in ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 )
-"""The standard's own, with their licence in them."""
+"""The standard's, with their licence in them, as fmpy has them: it took the prefix of names out."""
+NO_PREFIX = "#define fmi2FullName(name) name\n"
+PREFIX = """\
+#if defined(FMI2_FUNCTION_PREFIX) && !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
+    #define fmi2Paste(a, b) a ## b
+    #define fmi2PasteB(a, b) fmi2Paste(a, b)
+    #define fmi2FullName(name) fmi2PasteB(FMI2_FUNCTION_PREFIX, name)
+#else
+    #define fmi2FullName(name) name
+#endif
+"""
+"""As in the standard: a host that links the sources into one program defines it, as HovercraftNative_."""
 OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
 """What keeps the bits, and keeps libm out."""
 LIBRARY = ("-g0", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-slp-vectorize")
@@ -77,8 +88,9 @@ def build_native_fmu(path: str | os.PathLike[str] = f"build/{NATIVE.identifier}.
 
 def sources(build: str) -> dict[str, bytes]:
     """All that a C compiler needs, by name; `build` is a hexadecimal digest of 32 digits."""
-    files = [*sorted(C_FOLDER.glob("*.[ch]")), *FMI_HEADERS]
-    return {**{file.name: file.read_bytes() for file in files}, "variables.h": variables_header(build).encode()}
+    files = {file.name: file.read_bytes() for file in (*sorted(C_FOLDER.glob("*.[ch]")), *FMI_HEADERS)}
+    functions = files["fmi2Functions.h"].replace(NO_PREFIX.encode(), PREFIX.encode())
+    return {**files, "fmi2Functions.h": functions, "variables.h": variables_header(build).encode()}
 
 
 def _archive() -> bytes:
