@@ -14,20 +14,20 @@ DIGEST, BUILD, SUBSTEPS = slice(64), slice(12, 44), 44
 def with_build(blob: bytes, build: str) -> bytes:
     """As another build would have written it."""
     if blob.startswith(MAGIC):
-        return _signed(blob[: BUILD.start] + build.encode() + blob[BUILD.stop :])
+        return signed(blob[: BUILD.start] + build.encode() + blob[BUILD.stop :])
     return _rewritten(blob, lambda saved: saved.update(build=build))
 
 
 def with_substeps(blob: bytes, count: int) -> bytes:
     """With another count of sub-steps."""
     if blob.startswith(MAGIC):
-        return _signed(blob[:SUBSTEPS] + struct.pack("<i", count) + blob[SUBSTEPS + 4 :])
+        return signed(blob[:SUBSTEPS] + struct.pack("<i", count) + blob[SUBSTEPS + 4 :])
     return _rewritten(blob, lambda saved: saved["integers"].__setitem__(0, count))
 
 
 def with_word(blob: bytes, offset: int, word: int) -> bytes:
     """A native state with other four bytes somewhere, and the checksum right again."""
-    return _signed(blob[:offset] + struct.pack("<I", word) + blob[offset + 4 :])
+    return signed(blob[:offset] + struct.pack("<I", word) + blob[offset + 4 :])
 
 
 def _rewritten(blob: bytes, change: Callable[[dict[str, Any]], object]) -> bytes:
@@ -37,8 +37,8 @@ def _rewritten(blob: bytes, change: Callable[[dict[str, Any]], object]) -> bytes
     return hashlib.sha256(text).hexdigest().encode() + text
 
 
-def _signed(blob: bytes) -> bytes:
-    """FNV-1a, 64 bit."""
+def signed(blob: bytes) -> bytes:
+    """With the checksum right again, FNV-1a of 64 bit."""
     total = 0xCBF29CE484222325
     for byte in blob[:-8]:
         total = ((total ^ byte) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF

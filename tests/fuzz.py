@@ -9,7 +9,7 @@ from pathlib import Path
 from hovercraft_fmu.fmu.description import NATIVE
 from tests.native import C_TESTS, written_sources
 
-SANITIZE = ("-g", "-O1", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
+SANITIZE = ("-g", "-O1", "-fsanitize=fuzzer,address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 DEFAULT = 600
 """s"""
 

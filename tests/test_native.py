@@ -4,6 +4,7 @@ What both flavours must do is in test_lifecycle.py."""
 
 import math
 import os
+import struct
 import subprocess
 import sys
 import zipfile
@@ -25,7 +26,7 @@ from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STE
 from hovercraft_fmu.hosts import NATIVE_HOSTS, run_in
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, read_description, run_fmu, run_model
-from tests.blobs import with_word
+from tests.blobs import signed, with_word
 from tests.conftest import ROOT
 from tests.lowlevel import count, everything, get, one, put, reference, start
 from tests.native import c_compiler
@@ -422,6 +423,21 @@ def test_a_forged_state_cannot_break_the_instance(offset: int, word: int, shared
             call()
     instance.reset()
     start(instance)
+
+
+@pytest.mark.parametrize("step_size", [-1e-300, -1.0, 0.0, math.nan])
+def test_a_forged_sub_step_is_refused(step_size: float, instance: Any, messages: list[str]) -> None:
+    """Their number would not be one that an integer holds: undefined in C."""
+    start(instance)
+    instance.doStep(0.0, 0.01)
+    blob = bytes(instance.serializeFMUstate(instance.getFMUstate()))
+    kept, forged = struct.pack("<d", 0.001), struct.pack("<d", step_size)
+    places = [i for i in range(len(blob) - 8) if blob[i : i + 8] == kept]
+    assert len(places) == 2  # the parameter, and what the run took up of it
+    for place in places:
+        with pytest.raises(FMICallException):
+            instance.deSerializeFMUstate(signed(blob[:place] + forged + blob[place + 8 :]))
+        assert messages[-1] == f"serialized FMU state of {len(blob)} bytes: must be one that this FMU wrote"
 
 
 # ---- instances, logging

@@ -171,7 +171,7 @@ def printed_by(program: Path) -> str:
     return done.stdout.strip()
 
 
-SANITIZERS = {"address": ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+SANITIZERS = {"address": ("-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
               "thread": ("-g", "-fsanitize=thread")}  # fmt: skip
 
 

@@ -175,7 +175,7 @@ static bool is_possible(const struct content *c)
     const bool started = c->phase == STEPPING || c->phase == TERMINATED;
     const int32_t kept = c->integers[V_INTEGRATOR], used = c->settings.integrator;
     return c->phase < PHASE_COUNT && kept >= 1 && kept <= most && (!started || (used >= 1 && used <= most)) &&
-           c->integers[V_SUBSTEPS] >= 0;
+           c->reals[V_STEP_SIZE] > 0.0 && (!started || c->settings.step_size > 0.0) && c->integers[V_SUBSTEPS] >= 0;
 }
 
 enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
