@@ -265,6 +265,15 @@ def test_output_derivatives_at_rest(instance: Any) -> None:
     assert derivatives(instance) == [0.0, 0.0, 0.0, 0.05, 0.0, 0.0, 0.05, 0.0, 0.05]
 
 
+def test_an_output_derivative_that_is_no_number_is_refused(instance: Any, messages: list[str]) -> None:
+    """The outputs themselves are all finite."""
+    start(instance, velocity__y=1e120, velocity__yaw_rate=1e200, air_density=0.0)
+    assert all(map(math.isfinite, get(instance, *OUTPUTS)))
+    with pytest.raises(FMICallException):
+        derivatives(instance)
+    assert messages == ["derivative of body.surge = inf: must be a finite number; the motion is out of range"]
+
+
 # ---- status
 
 

@@ -172,7 +172,7 @@ static fmi2Status integers(fmi2Component craft, struct bytes *bytes)
                      : fmi2GetInteger(craft, how == 127 ? NULL : references, n, values);
 }
 
-static fmi2Status derivatives(fmi2Component craft, struct bytes *bytes)
+static fmi2Status derivatives(fmi2Component craft, struct bytes *bytes, const struct world *world)
 {
     const unsigned how = a_byte(bytes);
     const size_t n = how % MOST;
@@ -184,8 +184,12 @@ static fmi2Status derivatives(fmi2Component craft, struct bytes *bytes)
         orders[i] = a_byte(bytes) < 240 ? 1 : an_integer(bytes);
         values[i] = a_double(bytes);
     }
-    return how & 128 ? fmi2SetRealInputDerivatives(craft, references, n, orders, how == 255 ? NULL : values)
-                     : fmi2GetRealOutputDerivatives(craft, references, n, how == 127 ? NULL : orders, values);
+    if (how & 128)
+        return fmi2SetRealInputDerivatives(craft, references, n, orders, how == 255 ? NULL : values);
+    const fmi2Status status = fmi2GetRealOutputDerivatives(craft, references, n, how == 127 ? NULL : orders, values);
+    for (size_t i = 0; i < n && status == fmi2OK; i++)
+        demand(world->forged || isfinite(values[i]), "a derivative is not finite");
+    return status;
 }
 
 static fmi2Status others(fmi2Component craft, struct bytes *bytes)
@@ -323,7 +327,7 @@ static fmi2Status called(struct bytes *bytes, struct world *world, fmi2Component
         return integers(*craft, bytes);
     case 14:
     case 15:
-        return derivatives(*craft, bytes);
+        return derivatives(*craft, bytes, world);
     case 16:
     case 17:
     case 18:

@@ -660,16 +660,20 @@ static bool output_rate(const double *reals, unsigned reference, double *rate)
 enum verdict instance_get_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
                                 double *values)
 {
-    double unused;
+    double rate;
     if (observe_motion(instance) == REFUSED || observe_action(instance) == REFUSED)
         return REFUSED;
     for (size_t i = 0; i < n; i++) {
-        if (!output_rate(instance->now.reals, references[i], &unused))
+        if (!output_rate(instance->now.reals, references[i], &rate))
             return instance_say(instance, REFUSED,
                                 "value reference %u: must be that of an output to have a derivative",
                                 (unsigned long long)references[i]);
         if (check_order(instance, references[i], orders[i]) == REFUSED)
             return REFUSED;
+        if (!isfinite(rate))
+            return instance_say(instance, REFUSED,
+                                "derivative of %s = %r: must be a finite number; the motion is out of range",
+                                VARIABLES[references[i]].name, rate);
     }
     for (size_t i = 0; i < n; i++)
         output_rate(instance->now.reals, references[i], &values[i]);
