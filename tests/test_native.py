@@ -171,7 +171,7 @@ def test_ramps_are_part_of_the_state(instance: Any) -> None:
     assert get(instance, "thrust", "port_thruster") == [5.0, 0.0]
 
 
-def test_fmpys_own_way_to_ramps(instance: Any) -> None:
+def test_a_ramp_of_zero_changes_no_bit(instance: Any) -> None:
     """Without a ramp the bits are those of a step that never heard of one."""
     ends = []
     for rates in ({}, {"thrust": 0.0, "port_thruster": 0.0, "starboard_thruster": -0.0}):
