@@ -62,10 +62,10 @@ class Scene:
 
 
 def signals(rows: Iterable[Row]) -> Signals:
-    """Rows as a structured array with a column for every input; without wind its columns are 0."""
-    names = ("time", *INPUTS)
-    filled = [(*row, *[0.0] * (len(names) - len(row))) for row in rows]
-    return np.array(filled, dtype=[(name, np.float64) for name in names])
+    """Rows as a structured array, with a column for every input that they have."""
+    table = list(rows)
+    names = ("time", *INPUTS)[: len(table[0])]
+    return np.array(table, dtype=[(name, np.float64) for name in names])
 
 
 def scene(name: str) -> Scene:

@@ -9,7 +9,7 @@ import pytest
 
 import hovercraft_fmu
 from hovercraft_fmu.scenes import SCENES, signals
-from hovercraft_fmu.simulation import SimulationError, plain, plan, read_inputs, run_fmu
+from hovercraft_fmu.simulation import SimulationError, plain, plan, read_inputs, run_fmu, run_model
 
 
 def write(path: Path, text: str) -> Path:
@@ -95,6 +95,7 @@ def test_bad_control_logs(tmp_path: Path, text: str, message: str) -> None:
         ({"start_values": {"speed": 1.0}}, "speed = 1.0: must be a variable that can be set"),
         ({"start_values": {"mass": "heavy"}}, "mass = 'heavy': must be a number"),
         ({"start_values": {"integrator": "magic"}}, "integrator = 'magic': must be one of"),
+        ({"start_values": {"drag_area": "round"}}, "drag_area = 'round': must be one of constant, directional"),
         ({"stop_time": 0.0}, "stop_time = 0.0 s: must be after start_time = 0.0 s"),
         ({"stop_time": math.nan}, "stop_time = nan s: must be a finite number"),
         ({"communication_step": 0.0}, "communication_step = 0.0 s: must be greater than 0"),
@@ -135,3 +136,10 @@ def test_every_scene_can_be_planned() -> None:
     for name, scene in SCENES.items():
         run = plan(name)
         assert (run.title, run.stop_time, run.craft, run.start) == (name, scene.stop_time, scene.craft, scene.start)
+
+
+def test_a_scene_without_wind_takes_the_start_value_of_the_wind() -> None:
+    run = plan("launch", start_values={"wind.y": 0.2, "drag_area": "directional"}, stop_time=1.0)
+    assert set(run.signals["wind.y"]) == {0.2}
+    assert run_model(run)["velocity.y"][-1] > 0.0
+    assert set(plan("crosswind", start_values={"wind.y": 9.0}).signals["wind.y"]) == {0.15, 0.3}
