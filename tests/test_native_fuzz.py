@@ -9,6 +9,7 @@ from tests import fuzz
 from tests.native import written_sources
 
 
+@pytest.mark.once
 def test_twenty_seconds_without_a_finding(tmp_path: Path) -> None:
     if missing := fuzz.missing():
         pytest.skip(missing)

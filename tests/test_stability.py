@@ -139,6 +139,7 @@ def test_the_bound_falls_with_the_order_of_the_method(method: Any) -> None:
     assert 2.9 < order < 4.1 if method.name == "rk4" else order == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.once
 def test_the_command(tmp_path: Path) -> None:
     """The whole study; and what is committed is what it writes, but for the last bits of another machine's sines."""
     done = CliRunner().invoke(commands, ["stability", "--output", str(tmp_path / "new")])

@@ -359,6 +359,7 @@ def test_all_methods_go_the_same_way(craft: Craft, state: State, asked: Controls
 # ---- the study
 
 
+@pytest.mark.once
 def test_the_command(tmp_path: Path) -> None:
     done = CliRunner().invoke(commands, ["scene-terms", "--output", str(tmp_path)])
     assert done.exit_code == 0, done.output

@@ -83,6 +83,7 @@ def test_the_error_of_adaptive_follows_its_tolerance_on_every_held_scene() -> No
         assert row.error <= 1e3 * row.tolerance + 1e-9, row
 
 
+@pytest.mark.once
 def test_the_command(tmp_path: Path) -> None:
     done = CliRunner().invoke(commands, ["trade", "--quick", "--output", str(tmp_path)])
     assert done.exit_code == 0, done.output
