@@ -41,7 +41,7 @@ def write_cross_check(folder: Path) -> list[Path]:
     step = chosen.communication_step
     options = {"StartTime": 0.0, "StopTime": chosen.stop_time, "StepSize": step, "RelTol": 1e-4}
     (first / f"{name}_ref.opt").write_text("".join(f"{key},{value!r}\n" for key, value in options.items()))
-    _write_csv(first / f"{name}_in.csv", chosen.signals, ("time", *INPUTS))
+    _write_csv(first / f"{name}_in.csv", result.run.signals, ("time", *INPUTS))
     _write_csv(first / f"{name}_ref.csv", result.data, ("time", *OUTPUTS))
     (first / "ReadMe.txt").write_text(README.format(name=name, version=__version__, step=step))
     for place in places[1:]:

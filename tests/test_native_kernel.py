@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from hovercraft_fmu.fmu.native_package import C_FOLDER
 from hovercraft_fmu.model.craft import Craft
@@ -209,7 +210,7 @@ def test_rk4_keeps_its_order_on_ramps(libm: Kernel) -> None:
     rates, held = Controls(1.0, 0.2, -0.1, 0.02, -0.01), Controls(2.0, 0.1, 0.5, 0.05, 0.1)
     start = State(vx=0.3, vy=-0.1, yaw_rate=0.1)
 
-    def end(h: float) -> np.ndarray:
+    def end(h: float) -> NDArray[np.float64]:
         outcome, made = libm.advance(start, held, Craft(), 4.0, Settings(h, METHODS["rk4"]), rate=rates)
         assert outcome == "advanced"
         return np.array(made.state)
