@@ -51,7 +51,9 @@ def semi_implicit_euler(
     """
     loads_at = load_function(controls, craft, ns)
     rubbed = friction_function(craft, h, ns) if craft.rubs else None
-    mass, inertia, single = craft.mass, craft.inertia, ns is math
+    mass, inertia = craft.mass, craft.inertia
+    larger, smaller = (max, min) if ns is math else (ns.fmax, ns.fmin)
+    fast = ns is math and not rubbed
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
@@ -60,12 +62,7 @@ def semi_implicit_euler(
         vx = vx + h * (force_x / mass)
         vy = vy + h * (force_y / mass)
         yaw_rate = yaw_rate + h * (moment / inertia)
-        if rubbed:
-            vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
-        x = x + h * vx
-        y = y + h * vy
-        heading = heading + h * yaw_rate
-        if single:
+        if fast:
             if kq > most:
                 most = kq
             if yaw_rate > right:
@@ -73,10 +70,14 @@ def semi_implicit_euler(
             elif yaw_rate < left:
                 left = yaw_rate
         else:
-            most, left, right = ns.fmax(most, kq), ns.fmin(left, yaw_rate), ns.fmax(right, yaw_rate)
-    largest = max if single else ns.fmax
-    most = largest(most, loads_at(heading, vx, vy, yaw_rate)[3])
-    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * largest(right, -left))
+            if rubbed:
+                vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
+            most, left, right = larger(most, kq), smaller(left, yaw_rate), larger(right, yaw_rate)
+        x = x + h * vx
+        y = y + h * vy
+        heading = heading + h * yaw_rate
+    most = larger(most, loads_at(heading, vx, vy, yaw_rate)[3])
+    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * larger(right, -left))
 
 
 def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math) -> Stretch:
@@ -105,7 +106,9 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     in_wind, spins = windy(controls), any_of(craft.rotational_drag)
     wind_x, wind_y, spin = controls.wind_x, controls.wind_y, craft.spin_drag_factor
     thrust, side, turn = actuation(controls, craft, ns)
-    cos, sin, single = ns.cos, ns.sin, ns is math
+    cos, sin = ns.cos, ns.sin
+    larger, smaller = (max, min) if ns is math else (ns.fmax, ns.fmin)
+    fast = ns is math and not rubbed
     mass, inertia, x_d = craft.mass, craft.inertia, craft.drag_center
     damped, arm, square = inertia, mass * x_d * x_d, x_d * x_d
     x, y, heading, vx, vy, yaw_rate = state
@@ -131,12 +134,7 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
         vy = kept * vy + (s * surge + c * sway)
         if in_wind:
             vx, vy = vx + wind_x, vy + wind_y
-        if rubbed:
-            vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
-        x = x + h * vx
-        y = y + h * vy
-        heading = heading + h * yaw_rate
-        if single:
+        if fast:
             if kq > most:
                 most = kq
             if yaw_rate > right:
@@ -144,10 +142,14 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
             elif yaw_rate < left:
                 left = yaw_rate
         else:
-            most, left, right = ns.fmax(most, kq), ns.fmin(left, yaw_rate), ns.fmax(right, yaw_rate)
-    largest = max if single else ns.fmax
-    most = largest(most, loads_at(heading, vx, vy, yaw_rate)[3])
-    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * largest(right, -left))
+            if rubbed:
+                vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
+            most, left, right = larger(most, kq), smaller(left, yaw_rate), larger(right, yaw_rate)
+        x = x + h * vx
+        y = y + h * vy
+        heading = heading + h * yaw_rate
+    most = larger(most, loads_at(heading, vx, vy, yaw_rate)[3])
+    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * larger(right, -left))
 
 
 def rk4(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math) -> Stretch:
