@@ -19,7 +19,7 @@ def draw_work_precision(rows: Sequence[Row], path: Path) -> None:
     """Position error against cost: a panel a scene, at the longest communication step; bare and through fmpy."""
     scenes = list(dict.fromkeys(row.scene for row in rows))
     longest = max(row.communication_step for row in rows)
-    columns = min(4, len(scenes))
+    columns = min(3, len(scenes))
     lines = -(-len(scenes) // columns)
     figure = new_figure(figsize=(3.6 * columns + 0.6, 3.4 * lines + 0.9), dpi=110, layout="constrained")
     grid = figure.subplots(lines, columns, squeeze=False)
