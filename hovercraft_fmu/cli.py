@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.console import Console
+from rich.console import Console, Group
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -168,9 +168,7 @@ def trade(quick: bool, output: Path) -> None:
     """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes."""
     from .trade import native_costs, work_precision
 
-    with _progress(1.0, "measuring") as tell:
-        report = work_precision.run(output, quick, tell)
-    OUTPUT.print(report)
+    _measure(lambda folder, tell: work_precision.run(folder, quick, tell), output)
     OUTPUT.print(native_costs.run(output))
 
 
@@ -180,9 +178,7 @@ def stability(output: Path) -> None:
     """Measure where each method breaks: limits of the step, and a random study of the extremes."""
     from .trade import stability as study
 
-    with _progress(1.0, "measuring") as tell:
-        report = study.run(output, tell)
-    OUTPUT.print(report)
+    _measure(study.run, output)
 
 
 @commands.command("scene-terms")
@@ -191,9 +187,7 @@ def scene_terms(output: Path) -> None:
     """Measure what each opt-in term costs, and what leaving it out costs in accuracy, over the scenes."""
     from .trade import scene_terms as study
 
-    with _progress(1.0, "measuring") as tell:
-        report = study.run(output, tell)
-    OUTPUT.print(report)
+    _measure(study.run, output)
 
 
 @commands.command("cross-check")
@@ -230,6 +224,13 @@ def _progress(total: float, doing: str = "simulating") -> Iterator[Callable[[flo
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("", total=total)
         yield lambda time: progress.update(task, completed=time)
+
+
+def _measure(study: Callable[[Path, Callable[[float], None]], Group], output: Path) -> None:
+    """Make a study under a progress bar, and print its report."""
+    with _progress(1.0, "measuring") as tell:
+        report = study(output, tell)
+    OUTPUT.print(report)
 
 
 def _simulated(inputs: Inputs, fmu: Path | None, **options: Any) -> Result:

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import pytest
 from hypothesis import settings
@@ -47,6 +47,20 @@ def each_fmu(flavour: str, request: pytest.FixtureRequest) -> Path:
     """The FMU of that kind."""
     made: Path = request.getfixturevalue("native_fmu" if flavour == "native" else "fmu")
     return made
+
+
+@pytest.fixture
+def instance(shared: tuple[Any, list[str]]) -> Any:
+    """The module's `shared` instance (see there), as if it were new."""
+    shared[0].reset()
+    shared[1].clear()
+    return shared[0]
+
+
+@pytest.fixture
+def messages(shared: tuple[Any, list[str]]) -> list[str]:
+    """What the `shared` instance has said since."""
+    return shared[1]
 
 
 @pytest.fixture

@@ -27,6 +27,7 @@ DRAG_TERMS = {"drag_area": st.sampled_from([1, 2]), "rotational_drag": numbers(0
 crafts = st.one_of(st.builds(Craft, **ANY_CRAFT), st.builds(Craft, **ANY_CRAFT, **DRAG_TERMS))
 """Without friction, which is not a load like others."""
 CALM = {
+    **ANY_CRAFT,
     "mass": numbers(100.0, 1e5),
     "inertia": numbers(1000.0, 1e6),
     "length": numbers(0.5, 20.0),
@@ -34,10 +35,6 @@ CALM = {
     "height": numbers(0.5, 5.0),
     "drag_coefficient": numbers(0.0, 1.5),
     "air_density": numbers(0.0, 1.3),
-    "drag_center_fraction": numbers(-0.5, 0.5),
-    "steering_force": numbers(0.0, 100.0),
-    "thrust_min": numbers(-100.0, 0.0),
-    "thrust_max": numbers(0.0, 100.0),
 }
 calm_crafts = st.one_of(
     st.builds(Craft, **CALM),

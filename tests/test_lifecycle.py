@@ -47,18 +47,6 @@ def shared(each_fmu: Path) -> Iterator[tuple[Any, list[str]]]:
         yield made
 
 
-@pytest.fixture
-def instance(shared: tuple[Any, list[str]]) -> Any:
-    shared[0].reset()
-    shared[1].clear()
-    return shared[0]
-
-
-@pytest.fixture
-def messages(shared: tuple[Any, list[str]]) -> list[str]:
-    return shared[1]
-
-
 def assert_same(instance: Any, found: list[float], expected: list[float]) -> None:
     """Bit by bit; the native FMU brings its own sine and cosine, whose last bits may be others."""
     if instance.modelIdentifier == NATIVE.identifier:

@@ -44,18 +44,6 @@ def shared(native_fmu: Path) -> Iterator[tuple[Any, list[str]]]:
         yield made
 
 
-@pytest.fixture
-def instance(shared: tuple[Any, list[str]]) -> Any:
-    shared[0].reset()
-    shared[1].clear()
-    return shared[0]
-
-
-@pytest.fixture
-def messages(shared: tuple[Any, list[str]]) -> list[str]:
-    return shared[1]
-
-
 def ramp(instance: Any, **rates: float) -> None:
     instance.setRealInputDerivatives([reference(name) for name in rates], [1] * len(rates), list(rates.values()))
 

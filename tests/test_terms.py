@@ -258,6 +258,18 @@ def test_above_its_limit_the_rest_of_the_push_counts(method: Any, part: float, h
     assert rate == pytest.approx((push - craft.friction_force) / craft.mass, rel=1e-12)
 
 
+@pytest.mark.parametrize("name", ["semi_implicit_euler", "drag_implicit"])
+def test_in_wind_drag_implicit_lets_go_a_little_later(name: str) -> None:
+    """At 1 + h*k*q/m times the limit, as documented; Euler at the limit itself."""
+    h, wind, craft = 0.5, 0.2, Craft(skirt_friction=0.005, drag_center_fraction=0.0)
+    kq = craft.drag_factor * wind
+    later = 1.0 + h * kq / craft.mass if name == "drag_implicit" else 1.0
+    way = Settings(h, integrator(integrator_number(name)))
+    for part, moves in ((0.999, False), (1.001, True)):
+        asked = Controls(part * later * craft.friction_force - kq * wind, 0.0, 0.0, wind, 0.0)
+        assert (advance(State(), asked, craft, h, way).state.vx > 0.0) == moves
+
+
 @EVERY
 @given(numbers(-1.0, 1.0), numbers(-1.0, 1.0), numbers(-1.0, 1.0), st.sampled_from([0.01, 0.05, 1.0]))
 @settings(max_examples=40)
