@@ -13,6 +13,8 @@ from hovercraft_fmu.cli import commands
 from hovercraft_fmu.cross_check import PLATFORMS
 from hovercraft_fmu.fmu.description import NATIVE
 
+pytestmark = pytest.mark.once
+
 
 @pytest.fixture(scope="module")
 def repository(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -590,6 +590,7 @@ def sanitized(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return path
 
 
+@pytest.mark.once
 def test_clean_under_sanitizers_over_the_life_cycle(sanitized: Path) -> None:
     """The tests of the life cycle and of this file, again, on the sanitized library."""
     if os.environ.get("NATIVE_FMU"):

@@ -21,6 +21,8 @@ from tests.binaries import CPU_ARM64, CPU_X86_64, dll, dylib, elf, is_ad_hoc_sig
 from tests.conftest import Fresh
 from tests.native import c_compiler
 
+pytestmark = pytest.mark.once
+
 NAME = NATIVE.identifier
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 FUNCTIONS = set(

@@ -8,8 +8,9 @@ import pytest
 from tests import fuzz
 from tests.native import written_sources
 
+pytestmark = pytest.mark.once
 
-@pytest.mark.once
+
 def test_twenty_seconds_without_a_finding(tmp_path: Path) -> None:
     if missing := fuzz.missing():
         pytest.skip(missing)
