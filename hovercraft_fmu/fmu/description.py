@@ -6,7 +6,7 @@ from types import MappingProxyType
 from xml.etree.ElementTree import Element, SubElement
 
 from .._version import RELEASE_DATE, __version__
-from .interface import ENUMERATIONS, INDEX, UNITS, VARIABLES, Variable
+from .interface import VARIABLES, Model, Variable
 
 MODEL_NAME = "Hovercraft"
 DESCRIPTION = (
@@ -17,6 +17,7 @@ AUTHOR = "The hovercraft-fmu authors"
 LICENSE = "MIT"
 START_TIME, STOP_TIME, COMMUNICATION_STEP = 0.0, 60.0, 0.01
 """s: the default experiment. It names no tolerance: masters would pass it on to the FMU."""
+HOVERCRAFT = Model(MODEL_NAME, DESCRIPTION, VARIABLES, STOP_TIME, COMMUNICATION_STEP)
 CAPABILITIES = {
     "canHandleVariableCommunicationStepSize": "true",
     "canInterpolateInputs": "false",
@@ -39,8 +40,9 @@ LOG_CATEGORIES = {
 
 @dataclass(frozen=True)
 class Flavour:
-    """What the two FMUs do not share."""
+    """What is not the same in every FMU."""
 
+    model: Model
     identifier: str
     """FMI's modelIdentifier: the name of the binaries."""
     tool: str
@@ -51,6 +53,7 @@ class Flavour:
 
 
 PYTHON = Flavour(
+    model=HOVERCRAFT,
     identifier=MODEL_NAME,
     tool="PythonFMU",
     capabilities=MappingProxyType(CAPABILITIES),
@@ -62,6 +65,7 @@ PYTHON = Flavour(
     ),
 )
 NATIVE = Flavour(
+    model=HOVERCRAFT,
     identifier=f"{MODEL_NAME}Native",
     tool="zig cc",
     capabilities=MappingProxyType(
@@ -79,13 +83,14 @@ NATIVE = Flavour(
 
 def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
     """The description of the FMU whose content has the hexadecimal digest `build`, as an XML tree."""
+    model = flavour.model
     root = Element(
         "fmiModelDescription",
         {
             "fmiVersion": "2.0",
-            "modelName": MODEL_NAME,
+            "modelName": model.name,
             "guid": guid(build),
-            "description": DESCRIPTION,
+            "description": model.description,
             "author": AUTHOR,
             "version": __version__,
             "copyright": f"Copyright (c) {RELEASE_DATE[:4]} {AUTHOR}",
@@ -96,20 +101,24 @@ def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
         },
     )
     _co_simulation(root, flavour)
-    _units(SubElement(root, "UnitDefinitions"))
-    _types(SubElement(root, "TypeDefinitions"))
+    _units(SubElement(root, "UnitDefinitions"), model)
+    _types(SubElement(root, "TypeDefinitions"), model)
     categories = SubElement(root, "LogCategories")
     for name, text in flavour.categories.items():
         SubElement(categories, "Category", {"name": name, "description": text})
     SubElement(
         root,
         "DefaultExperiment",
-        {"startTime": repr(START_TIME), "stopTime": repr(STOP_TIME), "stepSize": repr(COMMUNICATION_STEP)},
+        {
+            "startTime": repr(START_TIME),
+            "stopTime": repr(model.stop_time),
+            "stepSize": repr(model.communication_step),
+        },
     )
     variables = SubElement(root, "ModelVariables")
-    for variable in VARIABLES:
-        _variable(variables, variable)
-    _structure(SubElement(root, "ModelStructure"))
+    for variable in model.variables:
+        _variable(variables, variable, model)
+    _structure(SubElement(root, "ModelStructure"), model)
     return root
 
 
@@ -126,8 +135,8 @@ def _co_simulation(parent: Element, flavour: Flavour) -> None:
             SubElement(files, "File", {"name": name})
 
 
-def _units(parent: Element) -> None:
-    for name, unit in UNITS.items():
+def _units(parent: Element, model: Model) -> None:
+    for name, unit in model.units.items():
         node = SubElement(parent, "Unit", {"name": name})
         SubElement(node, "BaseUnit", {base: str(exponent) for base, exponent in unit.base.items()})
         if unit.display:
@@ -135,20 +144,20 @@ def _units(parent: Element) -> None:
             SubElement(node, "DisplayUnit", {"name": display, "factor": repr(factor)})
 
 
-def _types(parent: Element) -> None:
-    for name, unit in UNITS.items():
+def _types(parent: Element, model: Model) -> None:
+    for name, unit in model.units.items():
         node = SubElement(parent, "SimpleType", {"name": unit.type_name, "description": f"{unit.quantity} in {name}"})
         real = SubElement(node, "Real", {"quantity": unit.quantity, "unit": name})
         if unit.display:
             real.set("displayUnit", unit.display[0])
-    for each in ENUMERATIONS:
+    for each in model.enumerations:
         node = SubElement(parent, "SimpleType", {"name": each.type_name, "description": each.description})
         items = SubElement(node, "Enumeration", {"quantity": each.type_name})
         for number, (name, text) in enumerate(each.items, 1):
             SubElement(items, "Item", {"name": name, "value": str(number), "description": text})
 
 
-def _variable(parent: Element, variable: Variable) -> None:
+def _variable(parent: Element, variable: Variable, model: Model) -> None:
     attributes = {
         "name": variable.name,
         "valueReference": str(variable.reference),
@@ -158,15 +167,15 @@ def _variable(parent: Element, variable: Variable) -> None:
     }
     if variable.initial:
         attributes["initial"] = variable.initial
-    _typed(SubElement(parent, "ScalarVariable", attributes), variable)
+    _typed(SubElement(parent, "ScalarVariable", attributes), variable, model)
 
 
-def _typed(parent: Element, variable: Variable) -> None:
+def _typed(parent: Element, variable: Variable, model: Model) -> None:
     node = SubElement(parent, variable.kind)
     if variable.enumeration:
         node.set("declaredType", variable.enumeration.type_name)
     if variable.unit:
-        unit = UNITS[variable.unit]
+        unit = model.units[variable.unit]
         node.set("declaredType", unit.type_name)
         node.set("quantity", unit.quantity)
         node.set("unit", variable.unit)
@@ -177,22 +186,22 @@ def _typed(parent: Element, variable: Variable) -> None:
         if value is not None:
             node.set(name, repr(value))  # repr: the shortest text that gives the same bits
     if variable.derivative_of:
-        node.set("derivative", str(INDEX[variable.derivative_of]))
+        node.set("derivative", str(model.index[variable.derivative_of]))
 
 
-def _structure(parent: Element) -> None:
+def _structure(parent: Element, model: Model) -> None:
     # An output belongs to a communication point: it never follows the inputs of that point, so no dependencies.
     # Without saying so, masters see algebraic loops that are not there.
     outputs = SubElement(parent, "Outputs")
-    for variable in VARIABLES:
+    for variable in model.variables:
         if variable.causality == "output":
-            SubElement(outputs, "Unknown", {"index": str(INDEX[variable.name]), "dependencies": ""})
+            SubElement(outputs, "Unknown", {"index": str(model.index[variable.name]), "dependencies": ""})
     unknowns = SubElement(parent, "InitialUnknowns")
-    for variable in VARIABLES:
+    for variable in model.variables:
         if variable.initial == "calculated" and variable.causality in ("output", "calculatedParameter"):
-            indices = sorted(INDEX[name] for name in variable.depends_on)
+            indices = sorted(model.index[name] for name in variable.depends_on)
             SubElement(
                 unknowns,
                 "Unknown",
-                {"index": str(INDEX[variable.name]), "dependencies": " ".join(map(str, indices))},
+                {"index": str(model.index[variable.name]), "dependencies": " ".join(map(str, indices))},
             )

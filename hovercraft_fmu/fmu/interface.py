@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from math import sqrt
 from types import MappingProxyType
 from typing import Literal, TypeAlias
@@ -10,7 +11,7 @@ from ..model.craft import DRAG_AREAS, Craft
 from ..model.dynamics import Controls, State, actuation, body_velocity, loads
 from ..model.integrators import INTEGRATORS
 
-Kind: TypeAlias = Literal["Real", "Integer", "Enumeration"]
+Kind: TypeAlias = Literal["Real", "Integer", "Enumeration", "Boolean"]
 Causality: TypeAlias = Literal["input", "output", "local", "parameter", "calculatedParameter"]
 Variability: TypeAlias = Literal["continuous", "discrete", "fixed", "tunable"]
 
@@ -114,6 +115,59 @@ class Variable:
         if self.causality == "input":
             return None
         return "calculated" if self.start is None else "exact"
+
+
+@dataclass(frozen=True)
+class Model:
+    """What an FMU is of: its table of variables, and what follows from that."""
+
+    name: str
+    description: str
+    variables: tuple[Variable, ...]
+    stop_time: float
+    """s, of the default experiment"""
+    communication_step: float
+    """s, of the default experiment"""
+
+    @cached_property
+    def by_reference(self) -> Mapping[int, Variable]:
+        """Value reference -> variable."""
+        return {variable.reference: variable for variable in self.variables}
+
+    @cached_property
+    def by_name(self) -> Mapping[str, Variable]:
+        """Name -> variable."""
+        return {variable.name: variable for variable in self.variables}
+
+    @cached_property
+    def index(self) -> Mapping[str, int]:
+        """Place in ModelVariables, counted from 1: what the model structure refers to."""
+        return {variable.name: i for i, variable in enumerate(self.variables, 1)}
+
+    @cached_property
+    def inputs(self) -> frozenset[int]:
+        """References of the inputs."""
+        return frozenset(v.reference for v in self.variables if v.causality == "input")
+
+    @cached_property
+    def kept(self) -> tuple[int, ...]:
+        """References of the Reals that are kept as the host set them: inputs and parameters."""
+        return tuple(
+            v.reference
+            for v in self.variables
+            if v.kind == "Real" and v.start is not None and v.causality in ("input", "parameter")
+        )
+
+    @cached_property
+    def units(self) -> Mapping[str, Unit]:
+        """Name -> unit, of those that its variables have."""
+        used = {variable.unit for variable in self.variables}
+        return {name: unit for name, unit in UNITS.items() if name in used}
+
+    @cached_property
+    def enumerations(self) -> tuple[Enumeration, ...]:
+        """Of its variables, each once."""
+        return tuple(dict.fromkeys(v.enumeration for v in self.variables if v.enumeration))
 
 
 _CRAFT = Craft()

@@ -26,7 +26,8 @@ from .interface import (
     Enumeration,
     Variable,
 )
-from .slave import HELD, SAME_TIME, SETTABLE, Phase
+from .life_cycle import SAME_TIME, Phase, may_be_set
+from .slave import HELD
 
 HEADER = """\
 /* Made from hovercraft_fmu/fmu/interface.py. */
@@ -173,7 +174,7 @@ def _constants(names: Iterable[str]) -> str:
 
 
 def _row(variable: Variable) -> str:
-    phases = sum(1 << i for i, phase in enumerate(Phase) if variable.reference in SETTABLE[phase])
+    phases = sum(1 << i for i, phase in enumerate(Phase) if may_be_set(variable, phase))
     role = _quoted(f"{variable.variability} {variable.causality}")
     given = "true" if variable.start is not None else "false"
     start = _number(float(variable.start or 0.0))

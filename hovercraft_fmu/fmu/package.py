@@ -8,6 +8,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
@@ -15,31 +16,31 @@ from types import ModuleType
 import pythonfmu
 from pythonfmu.builder import FmuBuilder
 
-from .description import MODEL_NAME
+from .description import PYTHON, Flavour
 from .document import pages
 from .icon import icon_png
 
 PACKAGE = Path(__file__).parent.parent
-TRAVELS = (
+SHARED = (
     "_version.py",
     "model/*.py",
     "fmu/__init__.py",
     "fmu/interface.py",
     "fmu/description.py",
-    "fmu/slave.py",
+    "fmu/life_cycle.py",
     "fmu/wrapper.py",
 )
-"""What of this package goes into the FMU, as patterns."""
+"""What of this package goes into every Python FMU, as patterns."""
 STATIC = Path(__file__).parent / "documentation"
 ENTRY_SCRIPT = '''\
 """The entry of the FMU. Its name carries a digest of the content, so no other module can be taken for it."""
 
 from typing import Any
 
-from {package}.fmu.slave import HovercraftSlave
+from {package}.{module} import {slave}
 
 
-class {model}(HovercraftSlave):
+class {model}({slave}):
     """The slave of this very build."""
 
     build = "{build}"
@@ -50,14 +51,34 @@ class {model}(HovercraftSlave):
 '''
 
 
-def build_fmu(path: str | os.PathLike[str] = f"build/{MODEL_NAME}.fmu") -> Path:
+@dataclass(frozen=True)
+class Content:
+    """What one Python FMU is made of."""
+
+    flavour: Flavour
+    module: str
+    """Of its slave, inside this package."""
+    slave: str
+    """Its class there."""
+    travels: tuple[str, ...]
+    """What of this package goes into it, beside SHARED."""
+    documents: Callable[[], dict[str, bytes]]
+    """Files of documentation/, by path."""
+
+
+def build_fmu(path: str | os.PathLike[str] = f"build/{PYTHON.identifier}.fmu") -> Path:
     """Write the FMU to `path` (its folder is made) and return the path.
 
     Raises:
         ValueError: the name does not end in .fmu.
         OSError: the file cannot be written; one that stood there before still does.
     """
-    return write_fmu(path, _archive)
+    return write_python_fmu(path, HOVERCRAFT_CONTENT)
+
+
+def write_python_fmu(path: str | os.PathLike[str], content: Content) -> Path:
+    """Write the Python FMU of that content to `path`. Raises as `build_fmu` does."""
+    return write_fmu(path, lambda: _archive(content))
 
 
 def write_fmu(path: str | os.PathLike[str], make: Callable[[], bytes]) -> Path:
@@ -76,36 +97,32 @@ def write_fmu(path: str | os.PathLike[str], make: Callable[[], bytes]) -> Path:
     return path
 
 
-def _archive() -> bytes:
-    sources = {f"{name.relative_to(PACKAGE).as_posix()}": name.read_bytes() for name in _traveling()}
-    documents = _documents()
+def _archive(content: Content) -> bytes:
+    sources = {path.relative_to(PACKAGE).as_posix(): path.read_bytes() for path in _traveling(content)}
+    documents = {**content.documents(), "licenses/pythonfmu.txt": _pythonfmu_license()}
     icon = icon_png()
     build = digest({**sources, **documents, "model.png": icon, **_pythonfmu_files()})
-    package = f"hovercraft_{build[:16]}"
+    name = content.flavour.identifier
+    package = f"{name.lower()}_{build[:16]}"
     with tempfile.TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
         work = Path(folder)
-        _write(work / package, {"__init__.py": b'"""The hovercraft model of one FMU."""\n', **sources})
+        _write(work / package, {"__init__.py": b'"""The model of one FMU."""\n', **sources})
         _write(work / "documentation", documents)
         script = work / f"{package}_fmu.py"
-        script.write_text(
-            ENTRY_SCRIPT.format(package=package, model=MODEL_NAME, build=build), encoding="utf-8", newline="\n"
-        )
+        text = ENTRY_SCRIPT.format(package=package, module=content.module, slave=content.slave, model=name, build=build)
+        script.write_text(text, encoding="utf-8", newline="\n")
         with _apart_from_this_process(package):
             fmu = FmuBuilder.build_FMU(
                 script,
-                dest=work / f"{MODEL_NAME}.fmu",
+                dest=work / f"{name}.fmu",
                 project_files=[work / package],
                 documentation_folder=work / "documentation",
             )
         return _repacked(fmu, package, icon)
 
 
-def _traveling() -> list[Path]:
-    return sorted(path for pattern in TRAVELS for path in PACKAGE.glob(pattern))
-
-
-def _documents() -> dict[str, bytes]:
-    return {**documents(native=False), "licenses/pythonfmu.txt": _pythonfmu_license()}
+def _traveling(content: Content) -> list[Path]:
+    return sorted(path for pattern in (*SHARED, *content.travels) for path in PACKAGE.glob(pattern))
 
 
 def documents(native: bool) -> dict[str, bytes]:
@@ -116,6 +133,9 @@ def documents(native: bool) -> dict[str, bytes]:
         if path.is_file() and path.suffix != ".jinja" and not (native and path.name == "externalDependencies.txt")
     }
     return {**static, **{name: page.encode() for name, page in pages(native).items()}}
+
+
+HOVERCRAFT_CONTENT = Content(PYTHON, "fmu.slave", "HovercraftSlave", ("fmu/slave.py",), lambda: documents(native=False))
 
 
 def _pythonfmu_license() -> bytes:

@@ -1,0 +1,323 @@
+"""What every slave does: life cycle, variables, state. What comes from the host is not trusted; it is checked once."""
+
+import hashlib
+import json
+import math
+from collections.abc import MutableMapping
+from enum import Enum
+from typing import Any, ClassVar, TypeVar
+from xml.etree.ElementTree import Element
+
+from ..model.subcycling import check_tolerance
+from .description import Flavour, model_description
+from .interface import Variable
+from .wrapper import WrappedSlave, called_by_wrapper
+
+SAME_TIME = 1e-9
+"""Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step, or past
+the stop time."""
+DIGEST_SIZE = 64
+"""Bytes of the hexadecimal SHA-256 ahead of a serialized state."""
+WHOLE_NUMBER = "Integer or Enumeration"
+Number = TypeVar("Number", float, int, bool)
+
+
+class Phase(Enum):
+    """Where the instance is in FMI's life cycle, in the words of the standard."""
+
+    INSTANTIATED = "instantiated"
+    INITIALIZING = "initialization mode"
+    STEPPING = "step mode"
+    TERMINATED = "terminated"
+
+
+def may_be_set(variable: Variable, phase: Phase) -> bool:
+    """Whether a host may set it there: start values before the first step, then inputs and what is tunable."""
+    if phase is Phase.STEPPING:
+        return variable.causality == "input" or variable.variability == "tunable"
+    return phase is not Phase.TERMINATED and variable.start is not None
+
+
+class Slave(WrappedSlave):
+    """A model behind the FMI functions of pythonfmu's wrapper; what is the model's own is in the methods at the end.
+
+    Variables are not registered with pythonfmu: its way of reading and writing them costs more than a sub-step, and
+    knows neither Enumerations nor the state between two communication points.
+    """
+
+    build: ClassVar[str] = ""
+    """A digest of all that is in the FMU; the entry script of an FMU sets it."""
+    flavour: ClassVar[Flavour]
+    on_demand: ClassVar[frozenset[int]] = frozenset()
+    """References of the Reals that are worked out when they are asked for."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        model = self.flavour.model
+        self._by_reference, self._inputs, self._kept = model.by_reference, model.inputs, model.kept
+        self._phase = Phase.INSTANTIATED
+        self._reals: dict[int, float] = {}
+        self._integers: dict[int, int] = {}
+        self._booleans: dict[int, bool] = {}
+        for variable in model.variables:
+            if variable.kind == "Boolean":
+                self._booleans[variable.reference] = bool(variable.start)
+            elif variable.kind != "Real":
+                self._integers[variable.reference] = int(variable.start or 0)
+            elif variable.reference not in self.on_demand:
+                self._reals[variable.reference] = float(variable.start or 0.0)
+        self._time = 0.0
+        self._stop_time = math.inf  # with the experiment; the standard forbids to step past it
+        self._hosts_tolerance: float | None = None  # with the experiment; it comes before a parameter of that name
+        self._tuned = False  # a parameter was set since the last step: the next one takes it up
+        self._stale = True  # the values that are read are not yet those of the communication point
+
+    # ---- life cycle
+
+    @called_by_wrapper
+    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+        self._require("fmi2SetupExperiment", Phase.INSTANTIATED)
+        if not math.isfinite(start_time):
+            raise ValueError(f"startTime = {start_time!r} s: must be a finite number")
+        if tolerance is not None:
+            check_tolerance(tolerance)
+        stop_time = math.inf if stop_time is None else stop_time
+        if not stop_time >= start_time:
+            raise ValueError(f"stopTime = {stop_time!r} s: must not be before startTime = {start_time!r} s")
+        self._time, self._stop_time, self._hosts_tolerance = start_time, stop_time, tolerance
+
+    @called_by_wrapper
+    def enter_initialization_mode(self) -> None:
+        self._require("fmi2EnterInitializationMode", Phase.INSTANTIATED)
+        self._phase = Phase.INITIALIZING
+
+    @called_by_wrapper
+    def exit_initialization_mode(self) -> None:
+        self._require("fmi2ExitInitializationMode", Phase.INITIALIZING)
+        self._take_up_start_values()
+        self._phase = Phase.STEPPING
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        try:
+            if self._phase is not Phase.STEPPING:
+                self._require("fmi2DoStep", Phase.STEPPING)
+            if not 0.0 < step_size < math.inf:
+                raise ValueError(f"communicationStepSize = {step_size!r} s: must be a finite number greater than 0")
+            time = self._time
+            if current_time != time and not abs(current_time - time) <= SAME_TIME * max(1.0, abs(time)):
+                raise ValueError(
+                    f"currentCommunicationPoint = {current_time!r} s: must be where the last step ended, {time!r} s"
+                )
+            stop_time = self._stop_time
+            if current_time + step_size - stop_time > SAME_TIME * max(1.0, abs(stop_time)):
+                raise ValueError(
+                    f"communicationStepSize = {step_size!r} s from {current_time!r} s: must not lead past "
+                    f"stopTime = {stop_time!r} s"
+                )
+            self._advance(step_size)
+            self._time = current_time + step_size
+            self._stale = True
+            return True
+        except Exception:
+            self.outlive_exception()
+            raise
+
+    @called_by_wrapper
+    def terminate(self) -> None:
+        self._require("fmi2Terminate", Phase.STEPPING)
+        self._phase = Phase.TERMINATED
+
+    def _require(self, call: str, phase: Phase) -> None:
+        if self._phase is not phase:
+            raise RuntimeError(f"{call} in state '{self._phase.value}': must be called in state '{phase.value}'")
+
+    def _started(self) -> bool:
+        return self._phase in (Phase.STEPPING, Phase.TERMINATED)
+
+    # ---- variables
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        try:
+            if self._stale:
+                self._observe()
+            try:
+                return list(map(self._reals.__getitem__, vrs))
+            except KeyError:
+                self._observe_on_demand()
+            try:
+                return list(map(self._reals.__getitem__, vrs))
+            except KeyError as error:
+                raise _unknown("Real", error.args[0]) from None
+        except Exception:
+            self.outlive_exception()
+            raise
+
+    @called_by_wrapper
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        return self._get(self._integers, WHOLE_NUMBER, vrs)
+
+    @called_by_wrapper
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        return self._get(self._booleans, "Boolean", vrs)
+
+    @called_by_wrapper
+    def get_string(self, vrs: list[int]) -> list[str]:
+        raise _unknown("String", vrs[0])
+
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        try:
+            if self._phase is Phase.STEPPING and self._inputs.issuperset(vrs) and math.isfinite(sum(values)):
+                reals = self._reals
+                for reference, value in zip(vrs, values):  # noqa: B905 - the wrapper makes both of one length
+                    reals[reference] = value
+                return  # inputs come often and have no other rule
+            self._set(self._reals, "Real", vrs, values)
+        except Exception:
+            self.outlive_exception()
+            raise
+
+    @called_by_wrapper
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        self._set(self._integers, WHOLE_NUMBER, vrs, values)
+
+    @called_by_wrapper
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        self._set(self._booleans, "Boolean", vrs, values)
+
+    @called_by_wrapper
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        raise _unknown("String", vrs[0])
+
+    def _get(self, table: MutableMapping[int, Number], kind: str, vrs: list[int]) -> list[Number]:
+        self._observe_discrete()
+        try:
+            return [table[reference] for reference in vrs]
+        except KeyError as error:
+            raise _unknown(kind, error.args[0]) from None
+
+    def _set(self, table: MutableMapping[int, Number], kind: str, vrs: list[int], values: list[Number]) -> None:
+        # all are checked before one is set: a refused call changes nothing
+        for reference, value in zip(vrs, values, strict=True):
+            if reference not in table and not (kind == "Real" and reference in self.on_demand):
+                raise _unknown(kind, reference)
+            self._check_set(self._by_reference[reference], value)
+        table.update(zip(vrs, values, strict=True))
+        self._after_set(vrs)
+
+    def _check_set(self, variable: Variable, value: float) -> None:
+        if not may_be_set(variable, self._phase):
+            raise ValueError(
+                f"{variable.name} = {value!r}: must not be set in state '{self._phase.value}' "
+                f"({variable.variability} {variable.causality})"
+            )
+        if not math.isfinite(value):
+            raise ValueError(f"{variable.name} = {value!r}: must be a finite number")
+        self._check_value(variable, value)
+
+    def _after_set(self, vrs: list[int]) -> None:
+        if self._phase is Phase.STEPPING:
+            # what is read belongs to the communication point: it changes with the next step, not now
+            self._tuned = self._tuned or not self._inputs.issuperset(vrs)
+        else:
+            self._stale = True
+
+    # ---- FMU state
+
+    @called_by_wrapper
+    def _get_fmu_state(self) -> dict[str, Any]:
+        return {
+            "build": self.build,
+            "phase": self._phase.name,
+            "time": self._time,
+            "stop_time": self._stop_time,
+            "tolerance": self._hosts_tolerance,
+            "reals": [self._reals[reference] for reference in self._kept],
+            "integers": [self._integers[reference] for reference in sorted(self._integers)],
+            "booleans": [self._booleans[reference] for reference in sorted(self._booleans)],
+            "tuned": self._tuned,
+            **self._own_state(),
+        }
+
+    @called_by_wrapper
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        self._check_build(state)
+        self._phase = Phase[state["phase"]]
+        self._time, self._stop_time, self._hosts_tolerance = state["time"], state["stop_time"], state["tolerance"]
+        self._reals.update(zip(self._kept, state["reals"], strict=True))
+        self._integers.update(zip(sorted(self._integers), state["integers"], strict=True))
+        self._booleans.update(zip(sorted(self._booleans), state["booleans"], strict=True))
+        self._tuned = state["tuned"]
+        self._set_own_state(state)
+        self._stale = True
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        text = json.dumps(state).encode()
+        return hashlib.sha256(text).hexdigest().encode() + text
+
+    @classmethod
+    def _fmu_state_from_bytes(cls, state: bytes) -> dict[str, Any]:
+        digest, text = state[:DIGEST_SIZE], state[DIGEST_SIZE:]
+        try:
+            if hashlib.sha256(text).hexdigest().encode() != digest:
+                raise ValueError(f"serialized FMU state of {len(state)} bytes: must be complete and unchanged")
+            restored: dict[str, Any] = json.loads(text)
+            cls._check_build(restored)
+        except Exception:
+            cls.outlive_exception_of_class()
+            raise
+        return restored
+
+    @classmethod
+    def _check_build(cls, state: dict[str, Any]) -> None:
+        if state["build"] != cls.build:
+            raise ValueError(f"FMU state of build {state['build']}: must be a state of this build, {cls.build}")
+
+    # ---- description
+
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
+        """The model description, made from the table of variables."""
+        return model_description(self.build, self.flavour)
+
+    # ---- what is the model's own
+
+    def _check_value(self, variable: Variable, value: float) -> None:
+        """Raises ValueError where a value alone is impossible; it is a finite number."""
+        raise NotImplementedError
+
+    def _take_up_start_values(self) -> None:
+        """Make the state from the start values. Raises ValueError where they are impossible together."""
+        raise NotImplementedError
+
+    def _advance(self, step_size: float) -> None:
+        """Go on by a communication step [s], or raise and change nothing."""
+        raise NotImplementedError
+
+    def _observe(self) -> None:
+        """Bring the values that are read up to the communication point, and unset `_stale`."""
+        raise NotImplementedError
+
+    def _observe_discrete(self) -> None:
+        """The same for Integers and Booleans, where they are not always there."""
+
+    def _observe_on_demand(self) -> None:
+        """Work out the rest of the Reals, which most hosts never ask for."""
+
+    def _own_state(self) -> dict[str, Any]:
+        """What the FMU state has beside inputs, parameters, Integers and Booleans."""
+        raise NotImplementedError
+
+    def _set_own_state(self, state: dict[str, Any]) -> None:
+        """Take it back."""
+        raise NotImplementedError
+
+
+def refuse_non_finite(names: tuple[str, ...], values: tuple[float, ...]) -> None:
+    """Raises ValueError where one of the values that are about to be read is not a finite number."""
+    for name, value in zip(names, values, strict=True):
+        if not math.isfinite(value):
+            raise ValueError(f"{name} = {value!r}: must be a finite number; the motion is out of range")
+
+
+def _unknown(kind: str, reference: int) -> ValueError:
+    return ValueError(f"value reference {reference}: must be that of a variable of type {kind}")
