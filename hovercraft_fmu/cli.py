@@ -1,7 +1,8 @@
 """The command hovercraft-fmu: a thin layer over the functions of the package."""
 
+import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from .fmu.native_package import build_native_fmu, has_compiler
 from .fmu.package import build_fmu
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES
-from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, plan, simulate
+from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, default_fmu, plan, simulate
 from .validation import Check, validate, validate_elsewhere
 from .view.tables import markdown
 
@@ -92,6 +93,14 @@ def _print_built(path: Path, flavour: str) -> None:
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
 @click.option("--output", type=click.Path(path_type=Path), metavar="FILE.csv", help="Write all columns.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the run.")
+@click.option(
+    "--animate", "animation", type=click.Path(path_type=Path), metavar="FILE.gif|FILE.html",
+    help="Draw the run as a moving picture, or as a page to play, zoom and point at.",
+)  # fmt: skip
+@click.option(
+    "--against", metavar="NAME=VALUE,...",
+    help="Animate a second run with these start values beside it: integrator=rk4,step_size=0.1.",
+)  # fmt: skip
 @click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
 def simulate_command(
     fmu: Path | None,
@@ -100,6 +109,8 @@ def simulate_command(
     settings: tuple[str, ...],
     output: Path | None,
     plot: Path | None,
+    animation: Path | None,
+    against: str | None,
     list_scenes: bool,
     **options: Any,
 ) -> None:
@@ -111,12 +122,63 @@ def simulate_command(
         return _print_scenes()
     if scene and log:
         raise click.UsageError("--scene and --input: must not be given together")
-    start_values = dict(_setting(text) for text in settings)
+    if against and not animation:
+        raise click.UsageError("--against: must be given together with --animate")
+    start_values = _settings(settings)
     inputs: Inputs = log if log else scene or "launch"
-    result = _simulated(inputs, fmu, start_values=start_values, **options)
-    _print_result(result)
-    _write(result, output, plot)
+    others = [{**start_values, **_settings(against.split(","), "--against")}] if against else []
+    if animation:
+        from .view.animation import check_animation
+
+        check_animation(animation)
+    results = [_simulated(inputs, fmu, start_values=each, **options) for each in (start_values, *others)]
+    for result in results:
+        _print_result(result)
+    _write(results[0], output, plot)
+    if animation:
+        _animate(results, animation)
     return None
+
+
+@commands.command("drive")
+@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@click.option("--record", metavar="FILE.csv", type=click.Path(path_type=Path), help="Write what you do, to replay it.")
+@click.option("--preset", metavar="NAME", default="ice", show_default=True, help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--integrator", metavar="NAME", help="The method of a sub-step; as --set integrator=NAME.")
+@click.option("--step-size", metavar="S", help="The sub-step; as --set step_size=S.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+@click.option("--communication-step", type=float, metavar="S", help="Default: 0.01 s.")
+@click.option("--time-scale", type=float, default=10.0, show_default=True, help="Simulated seconds a second.")
+def drive_command(
+    fmu: Path | None,
+    record: Path | None,
+    preset: str,
+    integrator: str | None,
+    step_size: str | None,
+    settings: tuple[str, ...],
+    communication_step: float | None,
+    time_scale: float,
+) -> None:
+    """Drive the FMU from the keyboard: the arrow keys, in a window, in real time.
+
+    FMU is the file; without it build/Hovercraft.fmu, which is built if it is not there. H shows the keys. What is
+    recorded replays to the same bits, with the command that is printed at the end.
+    """
+    from .view.drive import drive, plan_drive
+
+    short = {"integrator": integrator, "step_size": step_size}
+    start_values = {**_settings(settings), **{k: v for k, v in short.items() if v is not None}}
+    run = plan_drive(preset, start_values, communication_step)
+    path = default_fmu() if fmu is None else fmu
+
+    def recorded(log: Path) -> None:
+        words = ["hovercraft-fmu", "simulate", str(path), "--input", str(log), "--preset", preset]
+        words += ["--communication-step", repr(run.communication_step)]
+        words += [word for name, value in start_values.items() for word in ("--set", f"{name}={value}")]
+        OUTPUT.print(f"recorded {log}; to replay it:\n  {shlex.join(words)}", markup=False)
+
+    end = drive(run, path, record=record, recorded=recorded, time_scale=time_scale)
+    OUTPUT.print(f"ended at ({end.x:.3f}, {end.y:.3f}) m, heading {np.degrees(end.heading):.2f} deg")
 
 
 @commands.command("validate")
@@ -209,11 +271,14 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _setting(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise click.UsageError(f"--set {text}: must be NAME=VALUE")
-    return name.strip(), value.strip()
+def _settings(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
+    settings = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise click.UsageError(f"{option} {text}: must be NAME=VALUE")
+        settings[name.strip()] = value.strip()
+    return settings
 
 
 @contextmanager
@@ -302,3 +367,11 @@ def _write(result: Result, output: Path | None, plot: Path | None) -> None:
         from .view.plots import plot_run
 
         OUTPUT.print(f"wrote {plot_run(result, plot)}")
+
+
+def _animate(results: Sequence[Result], animation: Path) -> None:
+    from .view.animation import animate
+
+    with _progress(1.0, "drawing") as tell:
+        path = animate(results, animation, tell)
+    OUTPUT.print(f"wrote {path}: {path.stat().st_size / 1000:.0f} kB")

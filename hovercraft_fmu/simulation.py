@@ -54,6 +54,11 @@ class SimulationError(RuntimeError):
     """A run that the FMU or the master ended; the message is the FMU's own."""
 
 
+def method_in_words(integrator: str, step_size: float, tolerance: float) -> str:
+    """'rk4, 0.1 s'; of the adaptive method it is the tolerance that drives the accuracy."""
+    return f"{integrator}, " + (f"tolerance {tolerance:g}" if integrator == "adaptive" else f"{step_size:g} s")
+
+
 @dataclass(frozen=True)
 class Run:
     """All that one run needs, checked."""
@@ -79,6 +84,12 @@ class Run:
         """Sub-step and method."""
         method = integrator(int(self.value("integrator")))
         return Settings(float(self.value("step_size")), method, float(self.value("tolerance")))
+
+    @property
+    def method(self) -> str:
+        """The method and what drives its accuracy, in words."""
+        settings = self.settings
+        return method_in_words(settings.integrator.name, settings.step_size, settings.tolerance)
 
     @property
     def start(self) -> State:
@@ -143,9 +154,12 @@ def simulate(
         SimulationError: the FMU refused a value or a step, with its message; or the run ended early.
     """
     run = plan(scene_or_inputs, **options)
-    if fmu is None:
-        fmu = DEFAULT_FMU if DEFAULT_FMU.exists() else build_fmu(DEFAULT_FMU)
-    return run_fmu(run, fmu, progress)
+    return run_fmu(run, default_fmu() if fmu is None else fmu, progress)
+
+
+def default_fmu() -> Path:
+    """build/Hovercraft.fmu under the current folder, which is built if it is not there."""
+    return DEFAULT_FMU if DEFAULT_FMU.exists() else build_fmu(DEFAULT_FMU)
 
 
 def plan(
@@ -308,10 +322,6 @@ def _check_times(run: Run) -> None:
 
 def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = None) -> Result:
     """Run on an FMU, through fmpy, with its logging on. Raises as `simulate` does."""
-    path = Path(fmu)
-    if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{MODEL_NAME}.fmu")
-    description = read_description(path)
     messages: list[str] = []
 
     def step_finished(time: float, _recorder: object) -> bool:
@@ -319,25 +329,112 @@ def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = N
             progress(time)
         return True
 
-    with instantiated(path, description, messages) as (folder, instance):
-        try:
-            data = fmpy.simulate_fmu(
-                folder,
-                model_description=description,
-                fmu_instance=instance,
-                start_time=run.start_time,
-                stop_time=run.stop_time,
-                output_interval=run.communication_step,
-                start_values=dict(run.start_values),
-                input=run.signals,
-                output=[v.name for v in description.modelVariables if v.causality in ("input", "output", "local")],
-                step_finished=step_finished,
-            )
-        except Exception as error:
-            raise SimulationError("; ".join(messages) or str(error)) from error
+    with _loaded(fmu, messages) as (folder, instance, description), _refusals(messages):
+        data = fmpy.simulate_fmu(
+            folder,
+            model_description=description,
+            fmu_instance=instance,
+            start_time=run.start_time,
+            stop_time=run.stop_time,
+            output_interval=run.communication_step,
+            start_values=dict(run.start_values),
+            input=run.signals,
+            output=[v.name for v in description.modelVariables if v.causality in ("input", "output", "local")],
+            step_finished=step_finished,
+        )
     if not isclose(data["time"][-1], run.stop_time):
         raise SimulationError(f"the run ended at {data['time'][-1]!r} s: must reach stop_time = {run.stop_time!r} s")
     return Result(np.asarray(data), run, tuple(messages))
+
+
+class Stepper:
+    """An FMU that is taken from one communication point to the next by hand, with the calls of fmpy's master.
+
+    So `run_fmu` over the same controls, a row a communication point, comes to the same bits.
+    """
+
+    def __init__(self, instance: Any, description: Any, run: Run, messages: list[str]) -> None:
+        self.messages = messages
+        """What the FMU has said since it was started."""
+        self._instance, self._description, self._run = instance, description, run
+        self._steps = 0
+
+    @property
+    def time(self) -> float:
+        """s: the communication point reached."""
+        return self._point(self._steps)
+
+    def _point(self, n: int) -> float:
+        return self._run.start_time + n * self._run.communication_step
+
+    def start(self, controls: Controls) -> None:
+        """Initialize it, at the start time. Raises SimulationError: the FMU refused a start value."""
+        with _refusals(self.messages):
+            self._instance.setupExperiment(startTime=self._run.start_time)
+            left = dict(self._run.start_values)
+            left = self._apply(left, fmpy.simulation.settable_in_instantiated)
+            self._instance.enterInitializationMode()
+            self._apply(left, fmpy.simulation.settable_in_initialization_mode)
+            self._set(controls)
+            self._instance.exitInitializationMode()
+
+    def restart(self, controls: Controls) -> None:
+        """Back to the start. Raises as `start` does."""
+        self._instance.reset()
+        self._steps = 0
+        self.messages.clear()
+        self.start(controls)
+
+    def step(self, controls: Controls) -> None:
+        """One communication step, with the controls held. Raises SimulationError: the FMU refused it."""
+        time = self.time
+        with _refusals(self.messages):
+            self._set(controls)
+            self._instance.doStep(time, self._point(self._steps + 1) - time)
+        self._steps += 1
+
+    def read(self, *names: str) -> list[float]:
+        """The values of variables of the kind Real."""
+        return list(self._instance.getReal([BY_NAME[name].reference for name in names]))
+
+    def _apply(self, values: dict[str, float | int], settable: Callable[[Any], bool]) -> dict[str, float | int]:
+        """Set those that can be set now; return the others."""
+        left: dict[str, float | int] = fmpy.simulation.apply_start_values(
+            self._instance, self._description, values, settable=settable
+        )
+        return left
+
+    def _set(self, controls: Controls) -> None:
+        self._instance.setReal([BY_NAME[name].reference for name in INPUTS], controls)
+
+
+@contextmanager
+def stepping(run: Run, fmu: str | os.PathLike[str]) -> Iterator[Stepper]:
+    """An FMU to step by hand, not yet started. Raises as `simulate` does."""
+    messages: list[str] = []
+    with _loaded(fmu, messages) as (_, instance, description):
+        yield Stepper(instance, description, run, messages)
+
+
+@contextmanager
+def _loaded(fmu: str | os.PathLike[str], messages: list[str]) -> Iterator[tuple[str, Any, Any]]:
+    """The folder an FMU is extracted to, an instance in it, its description."""
+    path = Path(fmu)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{MODEL_NAME}.fmu")
+    description = read_description(path)
+    with instantiated(path, description, messages) as (folder, instance):
+        yield folder, instance, description
+
+
+@contextmanager
+def _refusals(messages: list[str]) -> Iterator[None]:
+    """What the FMU said meanwhile is the message of the error."""
+    said = len(messages)
+    try:
+        yield
+    except Exception as error:
+        raise SimulationError("; ".join(messages[said:]) or str(error)) from error
 
 
 def read_description(path: Path, validate: bool = True) -> Any:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ..simulation import method_in_words
+
 
 class Setting(NamedTuple):
     """What a user chooses."""
@@ -17,8 +19,7 @@ class Setting(NamedTuple):
     @property
     def label(self) -> str:
         """The method and what drives its accuracy."""
-        by = f"tolerance {self.tolerance:g}" if self.integrator == "adaptive" else f"{self.step_size:g} s"
-        return f"{self.integrator}, {by}"
+        return method_in_words(self.integrator, self.step_size, self.tolerance)
 
 
 @dataclass(frozen=True)

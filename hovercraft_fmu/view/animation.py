@@ -1,0 +1,404 @@
+"""Pictures that move: the craft with its jets along its path; one setting, or two against each other."""
+
+import importlib
+import os
+from collections.abc import Callable, Sequence
+from math import ceil, cos, floor, hypot, nan, sin
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageColor
+
+from ..fmu.icon import outline
+from ..simulation import Result
+from .plots import PORT, STARBOARD, new_figure
+from .shapes import Shape, jets
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+FRAMES = 80
+"""At most; fewer where there are fewer communication points."""
+FRAME_TIME = 75
+"""ms"""
+LAST_FRAME_TIME = 2000
+"""ms"""
+COLORS = ("#0072b2", "#d55e00")
+"""Of the first and the second setting: blue and vermilion, which colour-blind people tell apart (Okabe and Ito)."""
+JETS = {"thrust": "#f0b429", "port": PORT, "starboard": STARBOARD}
+INK = "#000000"
+SHADES = 8
+"""Of a colour, in a GIF."""
+PATH_POINTS = 2000
+"""Of a path in a page, at most."""
+DECADES = 1e-5
+"""Of the largest distance: what the logarithmic axis begins at."""
+UNWANTED = ("sendChartToCloud", "select2d", "lasso2d")
+"""Buttons of a page: one sends it away, the others do nothing here."""
+SUFFIXES = (".gif", ".html")
+
+Tell = Callable[[float], None]
+"""Called with the part of the work that is done, 0 to 1."""
+
+
+class Track(NamedTuple):
+    """One run, as it is drawn."""
+
+    result: Result
+    name: str
+    color: str
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """m, shape (n,)."""
+        return self.result["pose.x"]
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """m, shape (n,)."""
+        return self.result["pose.y"]
+
+    def hull(self, i: int) -> Shape:
+        """The outline at a communication point, world frame [m]."""
+        return self._placed(i, outline(self.result.run.craft))
+
+    def jets(self, i: int) -> dict[str, Shape]:
+        """What blows at a communication point, world frame [m]."""
+        row = self.result
+        controls = (row["applied.thrust"][i], *np.clip([row["port_thruster"][i], row["starboard_thruster"][i]], 0, 1))
+        return {name: self._placed(i, each) for name, each in jets(row.run.craft, *controls).items()}
+
+    def _placed(self, i: int, points: Shape) -> Shape:
+        x, y, heading = (float(self.result[name][i]) for name in ("pose.x", "pose.y", "pose.heading"))
+        c, s = cos(heading), sin(heading)
+        return [(x + c * ahead - s * across, y + s * ahead + c * across) for ahead, across in points]
+
+
+def check_animation(path: str | os.PathLike[str]) -> Path:
+    """The path. Raises ValueError: the name is none of an animation."""
+    path = Path(path)
+    if path.suffix not in SUFFIXES:
+        raise ValueError(f"animation = {str(path)!r}: must end in .gif (a moving picture) or .html (a page)")
+    return path
+
+
+def animate(results: Sequence[Result], path: str | os.PathLike[str], tell: Tell = lambda _: None) -> Path:
+    """Write one run, or two over the same communication points, as a GIF or as a page that needs no network.
+
+    Raises:
+        ValueError: the name ends in neither .gif nor .html; more than two runs, or runs over different times.
+        ModuleNotFoundError: matplotlib (for a GIF) or plotly (for a page) is not installed; says how to install it.
+        OSError: the file cannot be written.
+    """
+    path = check_animation(path)
+    if not 1 <= len(results) <= 2:
+        raise ValueError(f"results = {len(results)} runs: must be one or two")
+    if not np.array_equal(results[0]["time"], results[-1]["time"]):
+        raise ValueError("results: must have the same communication points")
+    tracks = [Track(*each) for each in zip(results, _names(results), COLORS, strict=False)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    (_write_gif if path.suffix == ".gif" else _write_page)(tracks, path, tell)
+    return path
+
+
+def _names(results: Sequence[Result]) -> list[str]:
+    """The method, what it cost, and what else differs."""
+    runs = [result.run for result in results]
+    values = {name for run in runs for name in run.start_values}
+    other = sorted(values - {"integrator", "step_size", "tolerance"})
+    differ = [name for name in other if len({run.value(name) for run in runs}) > 1]
+    return [
+        ", ".join([result.run.method, *(f"{name} {result.run.value(name):g}" for name in differ)])
+        + f": {result['substeps'][-1]:,} sub-steps".replace(",", " ")
+        for result in results
+    ]
+
+
+def apart(tracks: Sequence[Track]) -> NDArray[np.float64]:
+    """m, shape (n,): the distance between two runs at every communication point."""
+    distance: NDArray[np.float64] = np.hypot(tracks[1].x - tracks[0].x, tracks[1].y - tracks[0].y)
+    return distance
+
+
+def _title(tracks: Sequence[Track]) -> str:
+    result = tracks[0].result
+    title = f"{result.run.title}: {result.distance:.0f} m in {result['time'][-1] - result['time'][0]:g} s"
+    return title if len(tracks) == 1 else f"{title}; at the end {_metres(apart(tracks)[-1])} apart"
+
+
+def _metres(distance: float) -> str:
+    for unit, size in (("m", 1.0), ("mm", 1e-3)):
+        if distance >= size:
+            return f"{distance / size:.3g} {unit}"
+    return f"{distance:.2g} m"
+
+
+def _frames(tracks: Sequence[Track]) -> NDArray[np.int_]:
+    """The communication points that are drawn, evenly in time."""
+    time = tracks[0].result["time"]
+    wanted = np.linspace(time[0], time[-1], min(FRAMES, len(time)))
+    chosen: NDArray[np.int_] = np.unique(np.searchsorted(time, wanted - 1e-9 * (time[-1] - time[0])))
+    return chosen
+
+
+def _window(tracks: Sequence[Track]) -> tuple[float, float, float, float]:
+    """What the paths and the craft along them cover, low and high x, low and high y [m]."""
+    room = max(hypot(track.result.run.craft.length, track.result.run.craft.width) for track in tracks)
+    x, y = (np.concatenate([getattr(track, name) for track in tracks]) for name in "xy")
+    return float(x.min()) - room, float(x.max()) + room, float(y.min()) - room, float(y.max()) + room
+
+
+# ---- as a GIF
+
+
+def _write_gif(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
+    chosen, moving_picture = _frames(tracks), MovingPicture(tracks)
+    images = []
+    for done, i in enumerate(chosen, 1):
+        images.append(moving_picture.frame(i))
+        tell(done / len(chosen))
+    # one palette for all: what does not move does not change its colour, and costs no bytes
+    palette = _palette()
+    first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
+    times = [FRAME_TIME] * len(rest) + [LAST_FRAME_TIME]
+    first.save(path, save_all=True, append_images=rest, duration=times, loop=0, optimize=True)
+
+
+def _palette() -> Image.Image:
+    """Every colour, from white to full: smooth edges need what is between."""
+    full = np.array([ImageColor.getrgb(color) for color in (INK, *COLORS, *JETS.values())])
+    shares = np.arange(SHADES + 1)[:, None, None] / SHADES
+    image = Image.new("P", (1, 1))
+    image.putpalette(np.rint(255 + shares * (full - 255)).astype(int).ravel().tolist())
+    return image
+
+
+class MovingPicture:
+    """The whole path, a close-up that goes with the craft, and how far two runs are apart.
+
+    What stands still is drawn once.
+    """
+
+    def __init__(self, tracks: Sequence[Track]) -> None:
+        self._tracks, two = tracks, len(tracks) == 2
+        figure = new_figure(figsize=(9.0, 4.8), dpi=80, layout="constrained")
+        self._canvas = importlib.import_module("matplotlib.backends.backend_agg").FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(2 if two else 1, 2, width_ratios=(1.7, 1.0), height_ratios=(1.5, 1.0)[: 1 + two])
+        self.path, self.close_up = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1])
+        figure.suptitle(_title(tracks), fontsize="medium")
+        self._prepare_path()
+        self._ground = self._prepare_close_up()
+        places = (self.path, self.close_up)
+        self._movers = [_Mover(axes, track, filled=track is tracks[0]) for axes in places for track in tracks]
+        self._apart = figure.add_subplot(grid[1, 1]) if two else None
+        self._mark = _draw_apart(self._apart, tracks) if self._apart else None
+        self._clock = self.path.text(0.02, 0.97, "", transform=self.path.transAxes, va="top", animated=True)
+        figure.legend(*self.path.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small",
+                      frameon=False)  # fmt: skip
+        self._canvas.draw()
+        self._still = self._canvas.copy_from_bbox(figure.bbox)
+
+    def _prepare_path(self) -> None:
+        axes = self.path
+        left, right, top, bottom = _window(self._tracks)
+        axes.update_datalim([(left, top), (right, bottom)])
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.invert_yaxis()
+        axes.set_xlabel("x [m]", fontsize="small")
+        axes.set_ylabel("y [m], downward", fontsize="small")
+        axes.tick_params(labelsize="small")
+        axes.grid(alpha=0.3)
+
+    def _prepare_close_up(self) -> "Line2D":
+        """Lines on the ground, a craft length apart, so that one sees it pass by."""
+        axes, length = self.close_up, self._tracks[0].result.run.craft.length
+        axes.set_title(f"close up; lines every {length:g} m", fontsize="small", loc="left")
+        axes.set_xticks([])
+        axes.set_yticks([])
+        (ground,) = axes.plot([], [], color="#b0b0b0", linewidth=0.6, animated=True)
+        return ground
+
+    def frame(self, i: int) -> Image.Image:
+        """The picture of a communication point."""
+        self._canvas.restore_region(self._still)
+        self._look_closely(i)
+        for mover in self._movers:
+            mover.draw(i)
+        time = self._tracks[0].result["time"][i]
+        self._clock.set_text(f"{time:.0f} s")
+        self.path.draw_artist(self._clock)
+        if self._apart and self._mark:
+            self._mark.set_data([time], [apart(self._tracks)[i]])
+            self._apart.draw_artist(self._mark)
+        return Image.fromarray(np.array(self._canvas.buffer_rgba())).convert("RGB")
+
+    def _look_closely(self, i: int) -> None:
+        """All craft and some ground around them; a metre is as long down as across."""
+        axes, length = self.close_up, self._tracks[0].result.run.craft.length
+        hulls = np.concatenate([track.hull(i) for track in self._tracks])
+        low, high = hulls.min(axis=0) - 0.7 * length, hulls.max(axis=0) + 0.7 * length
+        box = axes.get_window_extent()
+        half = max((high[0] - low[0]) / box.width, (high[1] - low[1]) / box.height, 3.0 * length / box.width) / 2
+        (x, y), wide, tall = (low + high) / 2, half * box.width, half * box.height
+        axes.set_xlim(x - wide, x + wide)
+        axes.set_ylim(y + tall, y - tall)
+        across = [(each, each, nan) for each in _multiples(x - wide, x + wide, length)]
+        down = [(each, each, nan) for each in _multiples(y - tall, y + tall, length)]
+        ends_x, ends_y = (x - wide, x + wide, nan), (y - tall, y + tall, nan)
+        xs = [value for line in (*across, *[ends_x] * len(down)) for value in line]
+        ys = [value for line in (*[ends_y] * len(across), *down) for value in line]
+        self._ground.set_data(xs, ys)
+        axes.draw_artist(self._ground)
+
+
+def _multiples(low: float, high: float, size: float) -> list[float]:
+    return [n * size for n in range(ceil(low / size), floor(high / size) + 1)]
+
+
+class _Mover:
+    """One run in one place: its whole path, faint, and what moves along it."""
+
+    def __init__(self, axes: "Axes", track: Track, filled: bool) -> None:
+        self._axes, self._track = axes, track
+        color, dash = track.color, "-" if filled else (0, (4, 2))
+        (self._whole,) = axes.plot(track.x, track.y, color=color, linewidth=0.8, alpha=0.35, animated=True)
+        axes.plot([], [], color=color, linewidth=1.8, linestyle=dash, label=track.name)
+        (self._trail,) = axes.plot([], [], color=color, linewidth=1.8, linestyle=dash, animated=True)
+        face = f"{color}80" if filled else "none"
+        (self._hull,) = axes.fill([0.0], [0.0], facecolor=face, edgecolor=color, linewidth=1.6, animated=True)
+        self._jets = {name: axes.fill([0.0], [0.0], facecolor=each, animated=True)[0] for name, each in JETS.items()}
+
+    def draw(self, i: int) -> None:
+        """At a communication point."""
+        track = self._track
+        self._trail.set_data(track.x[: i + 1], track.y[: i + 1])
+        self._axes.draw_artist(self._whole)
+        self._axes.draw_artist(self._trail)
+        for name, corners in track.jets(i).items():
+            self._jets[name].set_xy(np.array(corners))
+            self._axes.draw_artist(self._jets[name])
+        self._hull.set_xy(np.array(track.hull(i)))
+        self._axes.draw_artist(self._hull)
+
+
+def _draw_apart(axes: "Axes", tracks: Sequence[Track]) -> "Line2D":
+    """The distance over time, where there is any; returns the mark that moves along it."""
+    distance = apart(tracks)
+    axes.plot(tracks[0].result["time"], distance, color="#555555", linewidth=1.2)
+    if distance.any():
+        axes.set_yscale("log")
+        axes.set_ylim(max(distance[distance > 0.0].min(), DECADES * distance.max()), 2.0 * distance.max())
+    (mark,) = axes.plot([], [], color="black", marker="o", markersize=5, animated=True)
+    axes.set_title("apart [m]", fontsize="small", loc="left")
+    axes.set_xlabel("time [s]", fontsize="small")
+    axes.tick_params(labelsize="small")
+    axes.grid(alpha=0.3)
+    return mark
+
+
+# ---- as a page
+
+
+def _write_page(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
+    """Every figure's data and plotly's script are in the page."""
+    try:
+        graphs, subplots = (importlib.import_module(f"plotly.{name}") for name in ("graph_objects", "subplots"))
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            "pages need plotly, which is not installed: pip install 'hovercraft-fmu[html]'"
+        ) from error
+    two = len(tracks) == 2
+    figure = subplots.make_subplots(cols=2 if two else 1, column_widths=[0.68, 0.32] if two else None)
+    for i, track in enumerate(tracks):
+        figure.add_trace(graphs.Scatter(**_path_trace(track, "solid" if i == 0 else "dash")))
+    if two:
+        kept = _kept(tracks[0])
+        line = {"x": tracks[0].result["time"][kept], "y": apart(tracks)[kept]}
+        figure.add_trace(graphs.Scatter(**line, showlegend=False, line_color="#555555", hovertemplate=_APART), 1, 2)
+    fixed = len(figure.data)
+    chosen = _frames(tracks)
+    for trace, column in _moving_traces(tracks, chosen[0]):
+        figure.add_trace(graphs.Scatter(**trace), 1, column)
+    moving = list(range(fixed, len(figure.data)))
+    times = [f"{tracks[0].result['time'][i]:.4g}" for i in chosen]
+    frames = []
+    for done, (i, time) in enumerate(zip(chosen, times, strict=True), 1):
+        data = [graphs.Scatter(x=trace["x"], y=trace["y"]) for trace, _ in _moving_traces(tracks, i)]
+        frames.append(graphs.Frame(name=time, data=data, traces=moving))
+        tell(done / len(chosen))
+    figure.frames = frames
+    figure.update_layout(**_page_layout(tracks, times))
+    if two:
+        figure.update_xaxes(title="time [s]", col=2)
+        scale = "log" if apart(tracks).any() else "linear"
+        figure.update_yaxes(title="apart [m]", type=scale, exponentformat="power", col=2)
+    config = {"scrollZoom": True, "displaylogo": False, "modeBarButtonsToRemove": UNWANTED}
+    figure.write_html(path, include_plotlyjs=True, auto_play=False, div_id="animation", config=config)
+
+
+_APART = "%{x:.2f} s: %{y:.3g} m apart<extra></extra>"
+
+
+def _kept(track: Track) -> NDArray[np.int_]:
+    """The communication points of a path that are in a page."""
+    n = len(track.x)
+    return np.unique(np.linspace(0, n - 1, min(n, PATH_POINTS)).astype(int))
+
+
+def _path_trace(track: Track, dash: str) -> dict[str, Any]:
+    kept, result = _kept(track), track.result
+    told = np.stack([result[name][kept] for name in ("time", "speed", "applied.thrust")], axis=1)
+    return {
+        "x": track.x[kept], "y": track.y[kept], "name": track.name, "mode": "lines", "customdata": told,
+        "line": {"color": track.color, "dash": dash, "width": 1.5},
+        "hovertemplate": "(%{x:.6g}, %{y:.6g}) m at %{customdata[0]:.2f} s: %{customdata[1]:.3f} m/s, "
+        "%{customdata[2]:.1f} N<extra></extra>",
+    }  # fmt: skip
+
+
+def _moving_traces(tracks: Sequence[Track], i: int) -> list[tuple[dict[str, Any], int]]:
+    """Traces and the column each is drawn in, always of the same number and order."""
+    traces: list[tuple[dict[str, Any], int]] = []
+    plain = {"mode": "lines", "showlegend": False, "hoverinfo": "skip"}
+    for n, track in enumerate(tracks):
+        blowing = track.jets(i)
+        for name, color in JETS.items():
+            corners = _columns(blowing.get(name, []))
+            traces.append(({**plain, **corners, "fill": "toself", "fillcolor": color, "line_width": 0}, 1))
+        fill = {"fill": "toself", "fillcolor": track.color} if n == 0 else {}
+        traces.append(({**plain, **_columns(track.hull(i)), **fill, "line": {"color": track.color, "width": 2}}, 1))
+    if len(tracks) == 2:
+        mark = {"x": [tracks[0].result["time"][i]], "y": [apart(tracks)[i]]}
+        traces.append(({**plain, **mark, "mode": "markers", "marker": {"color": "black", "size": 8}}, 2))
+    return traces
+
+
+def _columns(points: Shape) -> dict[str, list[float]]:
+    return {"x": [x for x, _ in points], "y": [y for _, y in points]}
+
+
+def _page_layout(tracks: Sequence[Track], times: Sequence[str]) -> dict[str, Any]:
+    left, right, top, bottom = _window(tracks)
+    now = {"mode": "immediate", "transition": {"duration": 0}}
+    play = {**now, "frame": {"duration": FRAME_TIME, "redraw": False}, "fromcurrent": True}
+    stop = {**now, "frame": {"duration": 0, "redraw": False}}
+    steps = [{"method": "animate", "label": time, "args": [[time], stop]} for time in times]
+    buttons = [
+        {"label": "play", "method": "animate", "args": [None, play]},
+        {"label": "pause", "method": "animate", "args": [[None], stop]},
+    ]
+    return {
+        "title": _title(tracks),
+        "template": "plotly_white",
+        "xaxis": {"title": "x [m]", "range": [left, right], "constrain": "domain"},
+        "yaxis": {"title": "y [m], downward", "range": [bottom, top], "scaleanchor": "x", "constrain": "domain"},
+        "legend": {"orientation": "h", "y": 1.06},
+        "sliders": [{"steps": steps, "currentvalue": {"prefix": "time ", "suffix": " s"}, "x": 0.12, "len": 0.88}],
+        "updatemenus": [
+            {"type": "buttons", "direction": "left", "buttons": buttons, "x": 0.0, "y": -0.12, "xanchor": "left",
+             "yanchor": "top", "showactive": False}
+        ],
+    }  # fmt: skip

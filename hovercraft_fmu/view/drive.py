@@ -1,0 +1,290 @@
+"""Drive the FMU from the keyboard, in real time, and record what the operator did."""
+
+import csv
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from math import inf
+from pathlib import Path
+from time import perf_counter
+from typing import Protocol
+
+from ..fmu.interface import INPUTS, STATES
+from ..model.dynamics import Controls, State
+from ..scenes import signals
+from ..simulation import Run, Stepper, Value, plan, stepping
+from .operator import Action, Operator, Pace
+from .window import Shown, Window, pygame
+
+TIME_SCALE = 10.0
+"""Simulated seconds a second: with this and the preset a held key moves the craft visibly within a second."""
+SLOWEST, FASTEST = 0.1, 1000.0
+PRESET = "ice"
+FRAME_RATE = 60
+LONGEST_LAG = 0.25
+"""s: what one frame catches up at most, and computes at most; the rest is dropped, and the drive runs slower."""
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0
+"""s, of the communication step: below, fmpy takes neighbouring rows of a long record for one jump."""
+HELD_KEYS: Mapping[int, Action] = {
+    pygame.K_UP: Action.MORE_THRUST,
+    pygame.K_DOWN: Action.LESS_THRUST,
+    pygame.K_RIGHT: Action.PORT_THRUSTER,
+    pygame.K_LEFT: Action.STARBOARD_THRUSTER,
+    pygame.K_d: Action.WIND_RIGHT,
+    pygame.K_a: Action.WIND_LEFT,
+    pygame.K_s: Action.WIND_DOWN,
+    pygame.K_w: Action.WIND_UP,
+}
+FASTER = (pygame.K_PLUS, pygame.K_EQUALS, pygame.K_KP_PLUS)
+SLOWER = (pygame.K_MINUS, pygame.K_KP_MINUS)
+
+
+class Clock(Protocol):
+    """What the window runs by."""
+
+    def now(self) -> float:
+        """s, from any moment on."""
+
+    def tick(self) -> None:
+        """Wait for the next frame."""
+
+
+class WallClock:
+    """Time as it passes."""
+
+    def __init__(self) -> None:
+        self._frames = pygame.time.Clock()
+
+    def now(self) -> float:
+        """s."""
+        return perf_counter()
+
+    def tick(self) -> None:
+        """Wait for the next frame."""
+        self._frames.tick(FRAME_RATE)
+
+
+def plan_drive(
+    preset: str = PRESET, start_values: Mapping[str, Value] | None = None, communication_step: float | None = None
+) -> Run:
+    """What a drive needs, checked. Raises ValueError as `plan` does, and for an impossible craft or step."""
+    run = plan(signals([(0.0,)]), preset=preset, start_values=start_values, communication_step=communication_step)
+    step = run.communication_step
+    if not SHORTEST_STEP <= step <= LONGEST_STEP:
+        raise ValueError(
+            f"communication_step = {step!r} s: must be from {SHORTEST_STEP} to {LONGEST_STEP:g} s to drive"
+        )
+    return run
+
+
+def drive(
+    run: Run,
+    fmu: str | os.PathLike[str],
+    *,
+    record: str | os.PathLike[str] | None = None,
+    recorded: Callable[[Path], None] = lambda _: None,
+    time_scale: float = TIME_SCALE,
+    clock: Clock | None = None,
+) -> State:
+    """Open a window and drive the FMU until it is closed; return the state that it ended in.
+
+    Args:
+        run: see `plan_drive`.
+        fmu: the file.
+        record: where the control log goes, one row a communication point: `simulate` over it, with the same craft,
+            settings and communication step, comes to the same bits. After a reset the next one goes beside it.
+        recorded: called with every log when it is complete, after an error, too.
+        time_scale: simulated seconds a second, at the start.
+        clock: what the window runs by, if not by the time that passes.
+
+    Raises:
+        ValueError, FileNotFoundError, SimulationError: as `simulate` does; the window is closed.
+        OSError: no window can be opened, or the log cannot be written.
+    """
+    if not SLOWEST <= time_scale <= FASTEST:
+        raise ValueError(f"time_scale = {time_scale!r}: must be from {SLOWEST:g} to {FASTEST:g}")
+    with (
+        stepping(run, fmu) as stepper,
+        closing(Flight(stepper, run, Path(record) if record else None, recorded)) as flight,
+        closing(Window(run.craft, f"hovercraft: {run.method}")) as window,
+        _ended_by_interrupt(),
+    ):
+        _Loop(flight, window, time_scale, clock or WallClock()).run()
+        return flight.state
+
+
+class ControlLog:
+    """A CSV file that grows while one drives."""
+
+    def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.path, self.last = path, -inf
+        self._file = path.open("w", newline="", encoding="utf-8")
+        self._writer = csv.writer(self._file, lineterminator="\n")
+        self._writer.writerow(("time", *INPUTS))
+
+    def write(self, time: float, controls: Controls) -> None:
+        """One row, with all digits."""
+        self._writer.writerow((time, *controls))
+        self.last = time
+
+    def close(self) -> None:
+        """All is on the disk."""
+        self._file.close()
+
+
+class Flight:
+    """An FMU, its operator, and the record of what the operator did."""
+
+    def __init__(self, stepper: Stepper, run: Run, record: Path | None, recorded: Callable[[Path], None]) -> None:
+        self._stepper, self._run = stepper, run
+        self._record, self._recorded = record, recorded
+        self._log: ControlLog | None = None
+        self._logs = 0
+        self.operator = self._new_operator()
+        stepper.start(self.operator.controls)
+
+    def _new_operator(self) -> Operator:
+        start = Controls(*(float(self._run.signals[name][0]) for name in INPUTS))
+        return Operator(start, self._run.craft, self._run.communication_step)
+
+    @property
+    def step_size(self) -> float:
+        """s: the communication step."""
+        return self._run.communication_step
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return self._stepper.time
+
+    @property
+    def state(self) -> State:
+        """As the FMU gives it."""
+        return State(*self._stepper.read(*STATES))
+
+    @property
+    def speed(self) -> float:
+        """m/s."""
+        return self._stepper.read("speed")[0]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the FMU has said since the start."""
+        return self._stepper.messages
+
+    def step(self) -> None:
+        """One communication step. Raises SimulationError: the FMU refused it; OSError: the log cannot be written."""
+        controls = self.operator.controls
+        if self._record:
+            if self._log is None:
+                self._log = self._new_log(self._record)
+            self._log.write(self.time, controls)
+        self._stepper.step(controls)
+        self.operator.pass_step()
+
+    def _new_log(self, first: Path) -> ControlLog:
+        self._logs += 1
+        return ControlLog(first if self._logs == 1 else first.with_stem(f"{first.stem}-{self._logs}"))
+
+    def reset(self) -> None:
+        """Back to the start. What was recorded stays; what comes is recorded beside it."""
+        self.close()
+        held = self.operator.held
+        self.operator = self._new_operator()
+        self.operator.held = held
+        self._stepper.restart(self.operator.controls)
+
+    def close(self) -> None:
+        """The last communication point ends the log: a row without a step."""
+        log, self._log = self._log, None
+        if log is None:
+            return
+        with closing(log):
+            if log.last < self.time:  # a step that was refused has its row, at this very time
+                log.write(self.time, self.operator.controls)
+        self._recorded(log.path)
+
+
+class _Loop:
+    """The event loop: time passes with the keys as they were, then the keys change, then the frame is drawn.
+
+    In this order the motion depends on when keys change, and not on how many frames were drawn meanwhile.
+    """
+
+    def __init__(self, flight: Flight, window: Window, time_scale: float, clock: Clock) -> None:
+        self._flight, self._window, self._clock = flight, window, clock
+        self._pace = Pace(flight.step_size, time_scale, clock.now())
+        self._paused = self._help = self._late = self._ended = False
+
+    def run(self) -> None:
+        """Until the window is closed."""
+        while not self._ended:
+            self._catch_up(self._clock.now())
+            for event in pygame.event.get():
+                self._take(event)
+            self._window.draw(self._shown())
+            self._clock.tick()
+
+    def _catch_up(self, now: float) -> None:
+        if self._paused:
+            self._pace.restart(now)
+            return
+        due, most = self._pace.due(now), int(LONGEST_LAG * self._pace.scale / self._flight.step_size) + 1
+        self._late = due > most
+        for _ in range(min(due, most)):
+            self._flight.step()
+            self._pace.take()
+            if self._clock.now() - now > LONGEST_LAG:
+                self._late = True
+                break
+        if self._late:
+            self._pace.restart(self._clock.now())
+
+    def _take(self, event: "pygame.event.Event") -> None:
+        if event.type == pygame.QUIT:
+            self._ended = True
+        elif event.type == pygame.KEYDOWN:
+            self._press(event.key)
+        elif event.type == pygame.KEYUP and event.key in HELD_KEYS:
+            self._flight.operator.held.discard(HELD_KEYS[event.key])
+
+    def _press(self, key: int) -> None:
+        if key in HELD_KEYS:
+            self._flight.operator.held.add(HELD_KEYS[key])
+        elif key == pygame.K_ESCAPE:
+            self._ended = True
+        elif key == pygame.K_SPACE:
+            self._paused = not self._paused
+        elif key == pygame.K_h:
+            self._help = not self._help
+        elif key == pygame.K_c:
+            self._flight.operator.calm()
+        elif key == pygame.K_r:
+            self._flight.reset()
+            self._window.clear()
+            self._pace.restart(self._clock.now())
+        elif key in FASTER or key in SLOWER:
+            scale = self._pace.scale * (2.0 if key in FASTER else 0.5)
+            self._pace.rescale(min(max(scale, SLOWEST), FASTEST), self._clock.now())
+
+    def _shown(self) -> Shown:
+        state = self._flight.state
+        notes = [f"warning: {each}" for each in self._flight.warnings]
+        if self._late:
+            notes.append("this machine cannot keep up: the drive runs slower than asked (- halves it)")
+        return Shown(
+            self._flight.time, (state.x, state.y, state.heading), self._flight.speed, self._flight.operator.controls,
+            self._pace.scale, self._paused, self._help, notes,
+        )  # fmt: skip
+
+
+@contextmanager
+def _ended_by_interrupt() -> Iterator[None]:
+    """Ctrl-C in the terminal closes the window as its button does, and not in the middle of a step."""
+    before = signal.signal(signal.SIGINT, lambda *_: pygame.event.post(pygame.event.Event(pygame.QUIT)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
