@@ -20,6 +20,7 @@ from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES
 from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, default_fmu, plan, simulate
 from .validation import Check, validate, validate_elsewhere
+from .view.operator import PRESET, TIME_SCALE
 from .view.tables import markdown
 
 DEMO_FOLDER = Path("build") / "demo"
@@ -52,6 +53,7 @@ def commands(context: click.Context) -> None:
     New here?
       hovercraft-fmu demo                          build, check and drive it; see build/demo/
       hovercraft-fmu build                         write build/Hovercraft.fmu and build/HovercraftNative.fmu
+      hovercraft-fmu drive                         the arrow keys, in a window
       hovercraft-fmu simulate --scene turn --plot turn.png
       hovercraft-fmu simulate --help               what can be set
     """
@@ -143,12 +145,14 @@ def simulate_command(
 @commands.command("drive")
 @click.argument("fmu", required=False, type=click.Path(path_type=Path))
 @click.option("--record", metavar="FILE.csv", type=click.Path(path_type=Path), help="Write what you do, to replay it.")
-@click.option("--preset", metavar="NAME", default="ice", show_default=True, help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--preset", metavar="NAME", default=PRESET, show_default=True, help=f"A craft: {', '.join(PRESETS)}.")
 @click.option("--integrator", metavar="NAME", help="The method of a sub-step; as --set integrator=NAME.")
 @click.option("--step-size", metavar="S", help="The sub-step; as --set step_size=S.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
 @click.option("--communication-step", type=float, metavar="S", help="Default: 0.01 s.")
-@click.option("--time-scale", type=float, default=10.0, show_default=True, help="Simulated seconds a second.")
+@click.option(
+    "--time-scale", type=float, default=TIME_SCALE, show_default=True, metavar="N", help="Simulated seconds a second."
+)
 def drive_command(
     fmu: Path | None,
     record: Path | None,
@@ -341,7 +345,7 @@ def _print_scenes() -> None:
 
 def _print_result(result: Result) -> None:
     run = result.run
-    table = Table(title=run.title, title_justify="left", show_header=False, box=None, pad_edge=False)
+    table = Table(title=f"{run.title}: {run.method}", title_justify="left", show_header=False, box=None, pad_edge=False)
     rows = {
         "duration": f"{result['time'][-1] - run.start_time:g} s, {len(result['time']) - 1} communication steps",
         "sub-steps": f"{result['substeps'][-1]}",

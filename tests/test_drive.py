@@ -21,7 +21,8 @@ from hovercraft_fmu.fmu.icon import outline
 from hovercraft_fmu.fmu.interface import STATES
 from hovercraft_fmu.model.dynamics import State
 from hovercraft_fmu.simulation import SimulationError, Value, read_inputs, simulate
-from hovercraft_fmu.view.drive import TIME_SCALE, drive, plan_drive
+from hovercraft_fmu.view.drive import drive, plan_drive
+from hovercraft_fmu.view.operator import TIME_SCALE
 from hovercraft_fmu.view.window import BAR, HULL, SIZE, VIEW_LENGTHS, WARNING
 
 Picture = NDArray[np.uint8]
@@ -171,9 +172,12 @@ def test_paused_time_stands_still_and_help_is_shown(fmu: Path, tmp_path: Path) -
 def test_a_reset_goes_back_to_the_start_and_keeps_the_record(fmu: Path, tmp_path: Path) -> None:
     """The key that is held across it stays held."""
     logs: list[Path] = []
+    other = tmp_path / "log-2.csv"
+    other.write_text("of another day")
     script = Script(2.0, {0.2: "up", 1.2: "r"})
     state = drive(plan_drive(), fmu, record=tmp_path / "log.csv", recorded=logs.append, clock=script)
-    assert logs == [tmp_path / "log.csv", tmp_path / "log-2.csv"]
+    assert logs == [tmp_path / "log.csv", tmp_path / "log-3.csv"]
+    assert other.read_text() == "of another day"
     lasts = [read_inputs(log)["time"][-1] for log in logs]
     assert lasts == pytest.approx([1.2 * TIME_SCALE, 0.8 * TIME_SCALE], abs=0.011)
     assert read_inputs(logs[1])["thrust"][[0, 100]].tolist() == [5.0, 6.0]

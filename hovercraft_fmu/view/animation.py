@@ -29,6 +29,10 @@ LAST_FRAME_TIME = 2000
 COLORS = ("#0072b2", "#d55e00")
 """Of the first and the second setting: blue and vermilion, which colour-blind people tell apart (Okabe and Ito)."""
 JETS = {"thrust": "#f0b429", "port": PORT, "starboard": STARBOARD}
+STAGES = {"rk4": " of 4 stages", "adaptive": " of 6 stages"}
+"""So many times these work out the loads in a sub-step; the others once. (What adaptive refused is not counted.)"""
+LEGEND_LINE = 100
+"""characters"""
 INK = "#000000"
 SHADES = 8
 """Of a colour, in a GIF."""
@@ -40,6 +44,8 @@ UNWANTED = ("sendChartToCloud", "select2d", "lasso2d")
 """Buttons of a page: one sends it away, the others do nothing here."""
 SUFFIXES = (".gif", ".html")
 
+Corner = NDArray[np.float64]
+"""x, y [m]"""
 Tell = Callable[[float], None]
 """Called with the part of the work that is done, 0 to 1."""
 
@@ -105,16 +111,16 @@ def animate(results: Sequence[Result], path: str | os.PathLike[str], tell: Tell 
 
 
 def _names(results: Sequence[Result]) -> list[str]:
-    """The method, what it cost, and what else differs."""
+    """The method, what else differs, and what it cost."""
     runs = [result.run for result in results]
-    values = {name for run in runs for name in run.start_values}
-    other = sorted(values - {"integrator", "step_size", "tolerance"})
-    differ = [name for name in other if len({run.value(name) for run in runs}) > 1]
-    return [
-        ", ".join([result.run.method, *(f"{name} {result.run.value(name):g}" for name in differ)])
-        + f": {result['substeps'][-1]:,} sub-steps".replace(",", " ")
-        for result in results
-    ]
+    other = {name for run in runs for name in run.start_values} - {"integrator", "step_size", "tolerance"}
+    differ = [name for name in sorted(other) if len({run.value(name) for run in runs}) > 1]
+    names = []
+    for run, result in zip(runs, results, strict=True):
+        setting = ", ".join([run.method, *(f"{name} {run.value(name):g}" for name in differ)])
+        substeps = f"{result['substeps'][-1]:,} sub-steps".replace(",", " ")
+        names.append(f"{setting}: {substeps}{STAGES.get(run.settings.integrator.name, '')}")
+    return names
 
 
 def apart(tracks: Sequence[Track]) -> NDArray[np.float64]:
@@ -144,11 +150,11 @@ def _frames(tracks: Sequence[Track]) -> NDArray[np.int_]:
     return chosen
 
 
-def _window(tracks: Sequence[Track]) -> tuple[float, float, float, float]:
-    """What the paths and the craft along them cover, low and high x, low and high y [m]."""
+def _corners(tracks: Sequence[Track]) -> tuple[Corner, Corner]:
+    """Low and high x and y [m] of what the paths and the craft along them cover."""
     room = max(hypot(track.result.run.craft.length, track.result.run.craft.width) for track in tracks)
-    x, y = (np.concatenate([getattr(track, name) for track in tracks]) for name in "xy")
-    return float(x.min()) - room, float(x.max()) + room, float(y.min()) - room, float(y.max()) + room
+    places = np.concatenate([np.column_stack([track.x, track.y]) for track in tracks])
+    return places.min(axis=0) - room, places.max(axis=0) + room
 
 
 # ---- as a GIF
@@ -196,21 +202,22 @@ class MovingPicture:
         self._apart = figure.add_subplot(grid[1, 1]) if two else None
         self._mark = _draw_apart(self._apart, tracks) if self._apart else None
         self._clock = self.path.text(0.02, 0.97, "", transform=self.path.transAxes, va="top", animated=True)
-        figure.legend(*self.path.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small",
-                      frameon=False)  # fmt: skip
+        handles, names = self.path.get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside lower center", ncols=2 if len("".join(names)) < LEGEND_LINE else 1,
+                      fontsize="small", frameon=False)  # fmt: skip
+        self._canvas.draw()
+        figure.set_layout_engine("none")  # once more, in the places that it found
+        _cover(self.path, *_corners(tracks))
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(figure.bbox)
 
     def _prepare_path(self) -> None:
         axes = self.path
-        left, right, top, bottom = _window(self._tracks)
-        axes.update_datalim([(left, top), (right, bottom)])
-        axes.set_aspect("equal", adjustable="datalim")
-        axes.invert_yaxis()
         axes.set_xlabel("x [m]", fontsize="small")
         axes.set_ylabel("y [m], downward", fontsize="small")
         axes.tick_params(labelsize="small")
         axes.grid(alpha=0.3)
+        _cover(axes, *_corners(self._tracks))
 
     def _prepare_close_up(self) -> "Line2D":
         """Lines on the ground, a craft length apart, so that one sees it pass by."""
@@ -236,22 +243,30 @@ class MovingPicture:
         return Image.fromarray(np.array(self._canvas.buffer_rgba())).convert("RGB")
 
     def _look_closely(self, i: int) -> None:
-        """All craft and some ground around them; a metre is as long down as across."""
+        """All craft and some ground around them."""
         axes, length = self.close_up, self._tracks[0].result.run.craft.length
-        hulls = np.concatenate([track.hull(i) for track in self._tracks])
-        low, high = hulls.min(axis=0) - 0.7 * length, hulls.max(axis=0) + 0.7 * length
-        box = axes.get_window_extent()
-        half = max((high[0] - low[0]) / box.width, (high[1] - low[1]) / box.height, 3.0 * length / box.width) / 2
-        (x, y), wide, tall = (low + high) / 2, half * box.width, half * box.height
-        axes.set_xlim(x - wide, x + wide)
-        axes.set_ylim(y + tall, y - tall)
-        across = [(each, each, nan) for each in _multiples(x - wide, x + wide, length)]
-        down = [(each, each, nan) for each in _multiples(y - tall, y + tall, length)]
-        ends_x, ends_y = (x - wide, x + wide, nan), (y - tall, y + tall, nan)
-        xs = [value for line in (*across, *[ends_x] * len(down)) for value in line]
-        ys = [value for line in (*[ends_y] * len(across), *down) for value in line]
-        self._ground.set_data(xs, ys)
+        room = 1.2 * max(max(track.result.run.craft.length, track.result.run.craft.width) for track in self._tracks)
+        places = np.array([(track.x[i], track.y[i]) for track in self._tracks])
+        _cover(axes, places.min(axis=0) - room, places.max(axis=0) + room)
+        (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+        across = [(each, each, nan) for each in _multiples(left, right, length)]
+        down = [(each, each, nan) for each in _multiples(top, bottom, length)]
+        xs = [*across, *[(left, right, nan)] * len(down)]
+        ys = [*[(top, bottom, nan)] * len(across), *down]
+        self._ground.set_data(np.ravel(xs), np.ravel(ys))
         axes.draw_artist(self._ground)
+
+
+def _cover(axes: "Axes", low: Corner, high: Corner) -> None:
+    """Axes that show all from a corner to the other [m]: y down, and a metre as long down as across.
+
+    (matplotlib's own equal aspect is equal to half a per cent.)
+    """
+    box = axes.get_window_extent()
+    half = 0.5 * max((high[0] - low[0]) / box.width, (high[1] - low[1]) / box.height)
+    x, y = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
+    axes.set_xlim(x - half * box.width, x + half * box.width)
+    axes.set_ylim(y + half * box.height, y - half * box.height)
 
 
 def _multiples(low: float, high: float, size: float) -> list[float]:
@@ -381,7 +396,7 @@ def _columns(points: Shape) -> dict[str, list[float]]:
 
 
 def _page_layout(tracks: Sequence[Track], times: Sequence[str]) -> dict[str, Any]:
-    left, right, top, bottom = _window(tracks)
+    (left, top), (right, bottom) = _corners(tracks)
     now = {"mode": "immediate", "transition": {"duration": 0}}
     play = {**now, "frame": {"duration": FRAME_TIME, "redraw": False}, "fromcurrent": True}
     stop = {**now, "frame": {"duration": 0, "redraw": False}}

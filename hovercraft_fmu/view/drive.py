@@ -1,6 +1,7 @@
 """Drive the FMU from the keyboard, in real time, and record what the operator did."""
 
 import csv
+import itertools
 import os
 import signal
 from collections.abc import Callable, Iterator, Mapping
@@ -14,13 +15,10 @@ from ..fmu.interface import INPUTS, STATES
 from ..model.dynamics import Controls, State
 from ..scenes import signals
 from ..simulation import Run, Stepper, Value, plan, stepping
-from .operator import Action, Operator, Pace
+from .operator import PRESET, TIME_SCALE, Action, Operator, Pace
 from .window import Shown, Window, pygame
 
-TIME_SCALE = 10.0
-"""Simulated seconds a second: with this and the preset a held key moves the craft visibly within a second."""
 SLOWEST, FASTEST = 0.1, 1000.0
-PRESET = "ice"
 FRAME_RATE = 60
 LONGEST_LAG = 0.25
 """s: what one frame catches up at most, and computes at most; the rest is dropped, and the drive runs slower."""
@@ -75,6 +73,7 @@ def plan_drive(
         raise ValueError(
             f"communication_step = {step!r} s: must be from {SHORTEST_STEP} to {LONGEST_STEP:g} s to drive"
         )
+    _ = run.craft  # it is checked when it is made
     return run
 
 
@@ -141,7 +140,7 @@ class Flight:
         self._stepper, self._run = stepper, run
         self._record, self._recorded = record, recorded
         self._log: ControlLog | None = None
-        self._logs = 0
+        self._recorded_once = False
         self.operator = self._new_operator()
         stepper.start(self.operator.controls)
 
@@ -185,8 +184,11 @@ class Flight:
         self.operator.pass_step()
 
     def _new_log(self, first: Path) -> ControlLog:
-        self._logs += 1
-        return ControlLog(first if self._logs == 1 else first.with_stem(f"{first.stem}-{self._logs}"))
+        """The first one where it was asked for, the next ones beside it, under names that are free."""
+        beside = (first.with_stem(f"{first.stem}-{n}") for n in itertools.count(2))
+        path = next(each for each in beside if not each.exists()) if self._recorded_once else first
+        self._recorded_once = True
+        return ControlLog(path)
 
     def reset(self) -> None:
         """Back to the start. What was recorded stays; what comes is recorded beside it."""

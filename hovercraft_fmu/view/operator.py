@@ -6,6 +6,8 @@ from math import floor, inf
 from ..model.craft import Craft
 from ..model.dynamics import Controls
 
+PRESET, TIME_SCALE = "ice", 10.0
+"""The craft, and simulated seconds a second, at which a held key moves it visibly within a second."""
 THRUST_RATE = 1.0
 """N/s, while a key is held."""
 WIND_RATE = 0.1
