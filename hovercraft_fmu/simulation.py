@@ -394,8 +394,9 @@ class Stepper:
         self._steps += 1
 
     def read(self, *names: str) -> list[float]:
-        """The values of variables of the kind Real."""
-        return list(self._instance.getReal([BY_NAME[name].reference for name in names]))
+        """The values of variables of the kind Real. Raises SimulationError: one is no finite number."""
+        with _refusals(self.messages):
+            return list(self._instance.getReal([BY_NAME[name].reference for name in names]))
 
     def _apply(self, values: dict[str, float | int], settable: Callable[[Any], bool]) -> dict[str, float | int]:
         """Set those that can be set now; return the others."""

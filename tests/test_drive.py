@@ -205,6 +205,13 @@ def test_a_refused_step_is_told_and_ends_the_window_with_a_whole_record(each_fmu
     assert replayed["time"][-1] == read_inputs(log)["time"][-1] > 0.0
 
 
+def test_a_value_that_cannot_be_read_is_told_and_ends_the_window(each_fmu: Path) -> None:
+    run = plan_drive(start_values={"velocity.y": 1e200, "drag_coefficient": 0.0})
+    with pytest.raises(SimulationError, match="speed = inf: must be a finite number"):
+        drive(run, each_fmu, clock=Script(0.4))
+    assert not pygame.display.get_init()
+
+
 def test_an_error_of_the_window_leaves_a_whole_record(fmu: Path, tmp_path: Path) -> None:
     class Broken(Script):
         def tick(self) -> None:
