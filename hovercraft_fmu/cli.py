@@ -101,7 +101,8 @@ def _print_built(path: Path, flavour: str) -> None:
 )  # fmt: skip
 @click.option(
     "--against", metavar="NAME=VALUE,...",
-    help="Animate a second run with these start values beside it: integrator=rk4,step_size=0.1.",
+    help="Animate a second run with these start values beside it: integrator=rk4,step_size=0.1. (--output and --plot "
+    "are of the first.)",
 )  # fmt: skip
 @click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
 def simulate_command(
@@ -124,11 +125,11 @@ def simulate_command(
         return _print_scenes()
     if scene and log:
         raise click.UsageError("--scene and --input: must not be given together")
-    if against and not animation:
+    if against is not None and not animation:
         raise click.UsageError("--against: must be given together with --animate")
     start_values = _settings(settings)
     inputs: Inputs = log if log else scene or "launch"
-    others = [{**start_values, **_settings(against.split(","), "--against")}] if against else []
+    others = [{**start_values, **_settings(against.split(","), "--against")}] if against is not None else []
     if animation:
         from .view.animation import check_animation
 

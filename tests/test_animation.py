@@ -58,6 +58,8 @@ def test_a_gif_moves(two: list[Result], tmp_path: Path) -> None:
 def test_fewer_communication_points_make_fewer_frames(tmp_path: Path) -> None:
     few = run_model(plan("launch", communication_step=10.0))
     assert len(frames(animate([few], tmp_path / "few.gif"))) == 7
+    page = animate([few], tmp_path / "few.html").read_text(encoding="utf-8")
+    assert re.findall(r'"label":"(\d+)"', page) == ["0", "10", "20", "30", "40", "50", "60"]
 
 
 def test_the_craft_is_drawn_where_it_is_and_metres_are_metres(two: list[Result]) -> None:
@@ -183,6 +185,7 @@ def test_the_command_animates_one_setting_against_another(fmu: Path, tmp_path: P
     [
         (("--animate", "x.mp4"), "animation = 'x.mp4': must end in .gif (a moving picture) or .html (a page)"),
         (("--against", "integrator=rk4"), "--against: must be given together with --animate"),
+        (("--animate", "x.gif", "--against", ""), "--against : must be NAME=VALUE"),
         (("--animate", "x.gif", "--against", "rk4"), "--against rk4: must be NAME=VALUE"),
         (("--animate", "x.gif", "--against", "integrator=magic"), "integrator = 'magic': must be one of"),
     ],

@@ -40,6 +40,7 @@ PATH_POINTS = 2000
 """Of a path in a page, at most."""
 DECADES = 1e-5
 """Of the largest distance: what the logarithmic axis begins at."""
+POINTED_AT = "%{x:.2f} s: %{y:.3g} m apart<extra></extra>"
 UNWANTED = ("sendChartToCloud", "select2d", "lasso2d")
 """Buttons of a page: one sends it away, the others do nothing here."""
 SUFFIXES = (".gif", ".html")
@@ -332,29 +333,25 @@ def _write_page(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
     if two:
         kept = _kept(tracks[0])
         line = {"x": tracks[0].result["time"][kept], "y": apart(tracks)[kept]}
-        figure.add_trace(graphs.Scatter(**line, showlegend=False, line_color="#555555", hovertemplate=_APART), 1, 2)
+        figure.add_trace(graphs.Scatter(**line, showlegend=False, line_color="#555555", hovertemplate=POINTED_AT), 1, 2)
     fixed = len(figure.data)
     chosen = _frames(tracks)
     for trace, column in _moving_traces(tracks, chosen[0]):
         figure.add_trace(graphs.Scatter(**trace), 1, column)
     moving = list(range(fixed, len(figure.data)))
-    times = [f"{tracks[0].result['time'][i]:.4g}" for i in chosen]
     frames = []
-    for done, (i, time) in enumerate(zip(chosen, times, strict=True), 1):
+    for done, i in enumerate(chosen, 1):
         data = [graphs.Scatter(x=trace["x"], y=trace["y"]) for trace, _ in _moving_traces(tracks, i)]
-        frames.append(graphs.Frame(name=time, data=data, traces=moving))
+        frames.append(graphs.Frame(name=str(i), data=data, traces=moving))
         tell(done / len(chosen))
     figure.frames = frames
-    figure.update_layout(**_page_layout(tracks, times))
+    figure.update_layout(**_page_layout(tracks, chosen))
     if two:
         figure.update_xaxes(title="time [s]", col=2)
         scale = "log" if apart(tracks).any() else "linear"
         figure.update_yaxes(title="apart [m]", type=scale, exponentformat="power", col=2)
     config = {"scrollZoom": True, "displaylogo": False, "modeBarButtonsToRemove": UNWANTED}
     figure.write_html(path, include_plotlyjs=True, auto_play=False, div_id="animation", config=config)
-
-
-_APART = "%{x:.2f} s: %{y:.3g} m apart<extra></extra>"
 
 
 def _kept(track: Track) -> NDArray[np.int_]:
@@ -395,12 +392,13 @@ def _columns(points: Shape) -> dict[str, list[float]]:
     return {"x": [x for x, _ in points], "y": [y for _, y in points]}
 
 
-def _page_layout(tracks: Sequence[Track], times: Sequence[str]) -> dict[str, Any]:
+def _page_layout(tracks: Sequence[Track], chosen: NDArray[np.int_]) -> dict[str, Any]:
     (left, top), (right, bottom) = _corners(tracks)
     now = {"mode": "immediate", "transition": {"duration": 0}}
     play = {**now, "frame": {"duration": FRAME_TIME, "redraw": False}, "fromcurrent": True}
     stop = {**now, "frame": {"duration": 0, "redraw": False}}
-    steps = [{"method": "animate", "label": time, "args": [[time], stop]} for time in times]
+    time = tracks[0].result["time"]
+    steps = [{"method": "animate", "label": f"{time[i]:.4g}", "args": [[str(i)], stop]} for i in chosen]
     buttons = [
         {"label": "play", "method": "animate", "args": [None, play]},
         {"label": "pause", "method": "animate", "args": [[None], stop]},
