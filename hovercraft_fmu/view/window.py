@@ -194,7 +194,7 @@ class Window:
             screen, (300, top), "speed", f"{shown.speed:.2f} m/s" if shown.speed < 1e4 else f"{shown.speed:.3g} m/s"
         )
         self._draw_value(screen, (480, top), "heading", f"{heading:.0f} deg")
-        self._draw_arrow(screen, (600, top + 40), shown.pose[2], HULL)
+        self._draw_arrow(screen, (616, top + 40), shown.pose[2], HULL)
         self._draw_value(screen, (680, top), "wind", f"{wind:.2f} m/s")
         if wind > 0.0:
             self._draw_arrow(screen, (826, top + 40), atan2(shown.controls.wind_y, shown.controls.wind_x), TRAIL)
