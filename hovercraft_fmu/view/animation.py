@@ -3,7 +3,7 @@
 import importlib
 import os
 from collections.abc import Callable, Sequence
-from math import ceil, cos, floor, hypot, nan, sin
+from math import ceil, floor, hypot, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,7 +14,7 @@ from PIL import Image, ImageColor
 from ..fmu.icon import outline
 from ..simulation import Result
 from .plots import PORT, STARBOARD, new_figure
-from .shapes import Shape, jets
+from .shapes import Shape, jets, placed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,9 +79,7 @@ class Track(NamedTuple):
         return {name: self._placed(i, each) for name, each in jets(row.run.craft, *controls).items()}
 
     def _placed(self, i: int, points: Shape) -> Shape:
-        x, y, heading = (float(self.result[name][i]) for name in ("pose.x", "pose.y", "pose.heading"))
-        c, s = cos(heading), sin(heading)
-        return [(x + c * ahead - s * across, y + s * ahead + c * across) for ahead, across in points]
+        return placed(points, *(float(self.result[name][i]) for name in ("pose.x", "pose.y", "pose.heading")))
 
 
 def check_animation(path: str | os.PathLike[str]) -> Path:

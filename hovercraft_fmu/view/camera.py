@@ -2,8 +2,9 @@
 
 import itertools
 from collections.abc import Iterator, Sequence
-from math import cos, sin
 from typing import NamedTuple, TypeAlias
+
+from .shapes import Shape, placed
 
 Point: TypeAlias = tuple[float, float]
 START = (0.1, 0.5)
@@ -33,11 +34,9 @@ class Camera(NamedTuple):
             wrapped(START[1] * self.height + self.scale * y, self.height),
         )
 
-    def body(self, pose: Sequence[float], points: Sequence[Point]) -> list[Point]:
+    def body(self, pose: Sequence[float], points: Shape) -> Shape:
         """Points of the body frame [m] around the place of a pose (x, y [m], heading [rad]); some may lie outside."""
-        x, y = self.place(pose[0], pose[1])
-        c, s = self.scale * cos(pose[2]), self.scale * sin(pose[2])
-        return [(x + c * ahead - s * across, y + s * ahead + c * across) for ahead, across in points]
+        return placed(points, *self.place(pose[0], pose[1]), pose[2], self.scale)
 
     def copies(self, points: Sequence[Point]) -> Iterator[list[Point]]:
         """The points, and again on the far side where they reach over an edge: whatever of it can be seen."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..fmu.icon import outline
 from ..simulation import Result
+from .shapes import placed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,12 +59,11 @@ def new_figure(**options: Any) -> "Figure":
 def _draw_path(axes: "Axes", result: Result) -> None:
     x, y = result["pose.x"], result["pose.y"]
     axes.plot(x, y, color=SEA, linewidth=1.0)
-    body_x, body_y = np.array(outline(result.run.craft)).T
+    hull = outline(result.run.craft)
     # evenly in time: where the craft is fast they stand apart
     for i in np.linspace(0, len(x) - 1, CRAFT_COUNT).astype(int):
-        c, s = np.cos(result["pose.heading"][i]), np.sin(result["pose.heading"][i])
-        hull_x, hull_y = x[i] + c * body_x - s * body_y, y[i] + s * body_x + c * body_y
-        axes.fill(hull_x, hull_y, facecolor=CRAFT, edgecolor=SEA, linewidth=0.9, zorder=3)
+        corners = placed(hull, x[i], y[i], result["pose.heading"][i])
+        axes.fill(*np.transpose(corners), facecolor=CRAFT, edgecolor=SEA, linewidth=0.9, zorder=3)
     _draw_wind(axes, result)
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()
