@@ -474,12 +474,12 @@ def test_an_instance_that_cannot_be_is_refused_with_a_word(library: Any, guid: b
     foreign = b"{%s%n%d\xff#r1#}"
     assert library.fmi2Instantiate(b"a", 1, foreign, b"", byref(callbacks.made), 0, 0) is None
     assert library.fmi2Instantiate(b"a", 1, None, b"", byref(callbacks.made), 0, 0) is None
-    assert library.fmi2Instantiate(b"a", 0, guid, b"", byref(callbacks.made), 0, 0) is None
+    assert library.fmi2Instantiate(b"a", 2, guid, b"", byref(callbacks.made), 0, 0) is None
     text = f"must be '{guid.decode()}', as in modelDescription.xml"
     assert callbacks.said == [
         (ERROR, "logStatusError", f"fmuGUID = '{{?s?n?d??r1?}}': {text}"),
         (ERROR, "logStatusError", f"fmuGUID = 'NULL': {text}"),
-        (ERROR, "logStatusError", "fmuType = 0: must be fmi2CoSimulation, 1"),
+        (ERROR, "logStatusError", "fmuType = 2: must be fmi2ModelExchange, 0, or fmi2CoSimulation, 1"),
     ]
     assert library.fmi2Instantiate(b"a", 1, foreign, b"", None, 0, 0) is None
 

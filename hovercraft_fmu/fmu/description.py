@@ -1,12 +1,12 @@
 """The table of variables -> modelDescription.xml, for both flavours of the FMU."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from xml.etree.ElementTree import Element, SubElement
 
 from .._version import RELEASE_DATE, __version__
-from .interface import VARIABLES, Model, Variable
+from .interface import CRAFT_PARAMETERS, DERIVATIVES, INPUTS, STATES, VARIABLES, Model, Variable
 
 MODEL_NAME = "Hovercraft"
 DESCRIPTION = (
@@ -18,11 +18,7 @@ LICENSE = "MIT"
 START_TIME, STOP_TIME, COMMUNICATION_STEP = 0.0, 60.0, 0.01
 """s: the default experiment. It names no tolerance: masters would pass it on to the FMU."""
 HOVERCRAFT = Model(MODEL_NAME, DESCRIPTION, VARIABLES, STOP_TIME, COMMUNICATION_STEP)
-CAPABILITIES = {
-    "canHandleVariableCommunicationStepSize": "true",
-    "canInterpolateInputs": "false",
-    "maxOutputDerivativeOrder": "0",
-    "canRunAsynchronuously": "false",  # sic: the schema spells it so
+COMMON_CAPABILITIES = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canNotUseMemoryManagementFunctions": "true",
     "canGetAndSetFMUstate": "true",
@@ -31,6 +27,14 @@ CAPABILITIES = {
     # the model is inside and runs in the host's own process, in any Python 3; no tool runs it elsewhere
     "needsExecutionTool": "false",
 }
+CAPABILITIES = {
+    **COMMON_CAPABILITIES,
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "maxOutputDerivativeOrder": "0",
+    "canRunAsynchronuously": "false",  # sic: the schema spells it so
+}
+NATIVE_CAPABILITIES = {"canNotUseMemoryManagementFunctions": "false", "providesDirectionalDerivative": "true"}
 LOG_CATEGORIES = {
     "logStatusWarning": "What the run survives but its user should know",
     "logStatusError": "A call that was refused",
@@ -48,6 +52,8 @@ class Flavour:
     tool: str
     capabilities: Mapping[str, str]
     categories: Mapping[str, str]
+    exchange: Mapping[str, str] = field(default_factory=dict)
+    """The capabilities in model exchange; none where there is no such interface."""
     sources: tuple[str, ...] = ()
     """Files of sources/ to compile."""
 
@@ -71,13 +77,26 @@ NATIVE = Flavour(
     capabilities=MappingProxyType(
         {
             **CAPABILITIES,
+            **NATIVE_CAPABILITIES,
             "canInterpolateInputs": "true",
             "maxOutputDerivativeOrder": "1",
-            "canNotUseMemoryManagementFunctions": "false",
         }
     ),
+    exchange=MappingProxyType({**COMMON_CAPABILITIES, **NATIVE_CAPABILITIES}),
     categories=MappingProxyType(LOG_CATEGORIES),
-    sources=("fmi2.c", "instance.c", "kernel.c", "logarithm.c", "memory.c", "serialize.c", "text.c", "trig.c"),
+    sources=(
+        "exchange.c",
+        "fmi2.c",
+        "instance.c",
+        "kernel.c",
+        "linearization.c",
+        "logarithm.c",
+        "memory.c",
+        "partials.c",
+        "serialize.c",
+        "text.c",
+        "trig.c",
+    ),
 )
 
 
@@ -98,9 +117,12 @@ def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
             "generationTool": f"hovercraft-fmu {__version__} with {flavour.tool}",
             "generationDateAndTime": RELEASE_DATE,
             "variableNamingConvention": "structured",
+            **({"numberOfEventIndicators": "0"} if flavour.exchange else {}),
         },
     )
-    _co_simulation(root, flavour)
+    if flavour.exchange:
+        _interface(root, "ModelExchange", flavour, flavour.exchange)
+    _interface(root, "CoSimulation", flavour, flavour.capabilities)
     _units(SubElement(root, "UnitDefinitions"), model)
     _types(SubElement(root, "TypeDefinitions"), model)
     categories = SubElement(root, "LogCategories")
@@ -118,7 +140,7 @@ def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
     variables = SubElement(root, "ModelVariables")
     for variable in model.variables:
         _variable(variables, variable, model)
-    _structure(SubElement(root, "ModelStructure"), model)
+    _structure(SubElement(root, "ModelStructure"), model, bool(flavour.exchange))
     return root
 
 
@@ -127,8 +149,8 @@ def guid(build: str) -> str:
     return f"{{{build[:8]}-{build[8:12]}-{build[12:16]}-{build[16:20]}-{build[20:32]}}}"
 
 
-def _co_simulation(parent: Element, flavour: Flavour) -> None:
-    node = SubElement(parent, "CoSimulation", {"modelIdentifier": flavour.identifier, **flavour.capabilities})
+def _interface(parent: Element, name: str, flavour: Flavour, capabilities: Mapping[str, str]) -> None:
+    node = SubElement(parent, name, {"modelIdentifier": flavour.identifier, **capabilities})
     if flavour.sources:
         files = SubElement(node, "SourceFiles")
         for name in flavour.sources:
@@ -189,19 +211,33 @@ def _typed(parent: Element, variable: Variable, model: Model) -> None:
         node.set("derivative", str(model.index[variable.derivative_of]))
 
 
-def _structure(parent: Element, model: Model) -> None:
-    # An output belongs to a communication point: it never follows the inputs of that point, so no dependencies.
-    # Without saying so, masters see algebraic loops that are not there.
+def _structure(parent: Element, model: Model, exchange: bool) -> None:
+    # In co-simulation an output belongs to a communication point: it never follows the inputs of that point, so there
+    # are no dependencies. Without saying so, masters see algebraic loops that are not there. In model exchange it
+    # follows the states, and no inputs either.
     outputs = SubElement(parent, "Outputs")
     for variable in model.variables:
         if variable.causality == "output":
-            SubElement(outputs, "Unknown", {"index": str(model.index[variable.name]), "dependencies": ""})
+            names = (variable.name,) if variable.name in STATES else variable.depends_on
+            _unknown(outputs, model, variable.name, names if exchange else ())
+    if exchange:
+        derivatives = SubElement(parent, "Derivatives")
+        for name in DERIVATIVES:
+            _unknown(derivatives, model, name, (name,) if name in STATES else _followed(name))
     unknowns = SubElement(parent, "InitialUnknowns")
     for variable in model.variables:
         if variable.initial == "calculated" and variable.causality in ("output", "calculatedParameter"):
-            indices = sorted(model.index[name] for name in variable.depends_on)
-            SubElement(
-                unknowns,
-                "Unknown",
-                {"index": str(model.index[variable.name]), "dependencies": " ".join(map(str, indices))},
-            )
+            _unknown(unknowns, model, variable.name, variable.depends_on)
+        elif exchange and variable.initial == "calculated" and variable.name in DERIVATIVES:
+            _unknown(unknowns, model, variable.name, _followed(variable.name) + CRAFT_PARAMETERS)
+
+
+def _followed(acceleration: str) -> tuple[str, ...]:
+    """The states and inputs that an acceleration follows; thrust has no moment."""
+    inputs = tuple(name for name in INPUTS if not (name == "thrust" and acceleration == "acceleration.yaw"))
+    return (*inputs, "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
+
+
+def _unknown(parent: Element, model: Model, name: str, dependencies: tuple[str, ...]) -> None:
+    indices = sorted(model.index[each] for each in dependencies)
+    SubElement(parent, "Unknown", {"index": str(model.index[name]), "dependencies": " ".join(map(str, indices))})

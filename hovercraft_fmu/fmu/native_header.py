@@ -10,8 +10,10 @@ from ..model.integrators import INTEGRATORS
 from .description import guid
 from .interface import (
     ACTION,
+    BY_NAME,
     COUNTER_STOPPED,
     CRAFT_PARAMETERS,
+    DERIVATIVES,
     ENUMERATIONS,
     INPUT_HELD,
     INPUTS,
@@ -38,7 +40,7 @@ HEADER = """\
 #include <math.h>
 #include <stddef.h>
 
-#include "kernel.h"
+#include "linearization.h"
 
 #define BUILD "{build}"
 #define GUID "{guid}"
@@ -104,12 +106,21 @@ static const struct derived_value DERIVED[] = {{
 }};
 static const unsigned INPUTS[] = {{{inputs}}};
 static const unsigned STATES[] = {{{states}}};
+static const unsigned DERIVATIVES[] = {{{derivatives}}}; /* of STATES */
+static const double NOMINALS[] = {{{nominals}}};         /* of STATES, in their units */
+static const unsigned KNOWNS[] = {{{knowns}}};           /* of linearization.h */
 static const unsigned MOTION[] = {{{motion}}};
 static const unsigned ACTION[] = {{{action}}};
 static const unsigned WATCHED[] = {{{watched}}};
 
 #endif
 """
+PHASES = (
+    *((phase.name, phase.value) for phase in Phase),
+    ("EVENT_MODE", "event mode"),
+    ("CONTINUOUS_TIME", "continuous-time mode"),
+)
+"""Name, the words of the standard; the last two are model exchange's."""
 OF_A_KIND = {
     "drag_center_fraction": "FRACTION",
     "rotational_drag": "SHARE",
@@ -141,9 +152,9 @@ def variables_header(build: str) -> str:
         lists="\n".join(_list(each) for each in ENUMERATIONS),
         held=repr(HELD),
         same_time=repr(SAME_TIME),
-        phases=", ".join(phase.name for phase in Phase),
+        phases=", ".join(name for name, _ in PHASES),
         rules=", ".join(RULES),
-        phase_names=", ".join(_quoted(phase.value) for phase in Phase),
+        phase_names=", ".join(_quoted(words) for _, words in PHASES),
         variables="\n".join(f"    [{constant(v.name)}] = {_row(v)}," for v in VARIABLES),
         methods="\n".join(
             f"    {{{_quoted(m.name)}, {_number(m.stability_limit)}, {_number(m.rotation_limit)}}},"
@@ -158,6 +169,9 @@ def variables_header(build: str) -> str:
         ),
         inputs=_constants(INPUTS),
         states=_constants(STATES),
+        derivatives=_constants(DERIVATIVES),
+        nominals=", ".join(_number(BY_NAME[name].nominal or 1.0) for name in STATES),
+        knowns=_constants(STATES + INPUTS),
         motion=_constants(MOTION),
         action=_constants(ACTION),
         watched=_constants(WATCHED),
@@ -174,7 +188,9 @@ def _constants(names: Iterable[str]) -> str:
 
 
 def _row(variable: Variable) -> str:
-    phases = sum(1 << i for i, phase in enumerate(Phase) if may_be_set(variable, phase))
+    settable = [may_be_set(variable, phase) for phase in Phase]
+    settable += [may_be_set(variable, Phase.STEPPING), variable.causality == "input"]
+    phases = sum(1 << i for i, each in enumerate(settable) if each)
     role = _quoted(f"{variable.variability} {variable.causality}")
     given = "true" if variable.start is not None else "false"
     start = _number(float(variable.start or 0.0))

@@ -1,4 +1,4 @@
-/* The FMI 2.0 co-simulation interface: it translates, and checks pointers; all else is the instance's. */
+/* FMI 2.0, co-simulation and model exchange: it translates, and checks pointers; all else is the instance's. */
 
 #include <math.h>
 #include <stdbool.h>
@@ -96,9 +96,9 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean on, size_t n
 
 static bool is_acceptable(struct component *c, fmi2Type type, fmi2String guid)
 {
-    if (type != fmi2CoSimulation)
-        instance_say(&c->instance, REFUSED, "fmuType = %i: must be fmi2CoSimulation, %i", (long long)type,
-                     (long long)fmi2CoSimulation);
+    if (type != fmi2CoSimulation && type != fmi2ModelExchange)
+        instance_say(&c->instance, REFUSED, "fmuType = %i: must be fmi2ModelExchange, %i, or fmi2CoSimulation, %i",
+                     (long long)type, (long long)fmi2ModelExchange, (long long)fmi2CoSimulation);
     else if (!guid || strcmp(guid, GUID) != 0)
         instance_say(&c->instance, REFUSED, "fmuGUID = '%q': must be '%s', as in modelDescription.xml",
                      guid ? guid : "NULL", GUID);
@@ -123,7 +123,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     c->errors = true;
     memcpy(c->name, name ? name : "", length);
     c->name[length] = '\0';
-    instance_start(&c->instance, tell, c);
+    instance_start(&c->instance, type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION, tell, c);
     if (is_acceptable(c, type, guid))
         return c;
     release(callbacks, c);
@@ -276,9 +276,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate state)
         return fmi2Error;
     if (!state)
         return refuse_null(c, "fmi2SetFMUstate");
-    c->instance.now = *(const struct content *)state;
-    c->instance.last_step = FINE;
-    return fmi2OK;
+    return status_of(instance_restore(&c->instance, state));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *state)
@@ -341,9 +339,13 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2Value
                                         const fmi2ValueReference known[], size_t n_known, const fmi2Real d_known[],
                                         fmi2Real d_unknown[])
 {
-    (void)unknown, (void)n_unknown, (void)known, (void)n_known, (void)d_known, (void)d_unknown;
-    return component ? refuse(component, "fmi2GetDirectionalDerivative", "providesDirectionalDerivative is false")
-                     : fmi2Error;
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if ((n_unknown > 0 && (!unknown || !d_unknown)) || (n_known > 0 && (!known || !d_known)))
+        return refuse_null(c, "fmi2GetDirectionalDerivative");
+    return status_of(instance_directional_derivatives(&c->instance, "fmi2GetDirectionalDerivative", unknown, n_unknown,
+                                                      known, n_known, d_known, d_unknown));
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t n,
@@ -354,6 +356,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
         return fmi2Error;
     if (n > 0 && (!vr || !order || !value))
         return refuse_null(c, "fmi2SetRealInputDerivatives");
+    if (instance_require_use(&c->instance, "fmi2SetRealInputDerivatives", CO_SIMULATION) == REFUSED)
+        return fmi2Error;
     return status_of(instance_set_rates(&c->instance, vr, n, order, value));
 }
 
@@ -365,7 +369,115 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const fmi2Value
         return fmi2Error;
     if (n > 0 && (!vr || !order || !value))
         return refuse_null(c, "fmi2GetRealOutputDerivatives");
+    if (instance_require_use(&c->instance, "fmi2GetRealOutputDerivatives", CO_SIMULATION) == REFUSED)
+        return fmi2Error;
     return status_of(instance_get_rates(&c->instance, vr, n, order, value));
+}
+
+/* ---- model exchange */
+
+fmi2Status fmi2EnterEventMode(fmi2Component component)
+{
+    struct component *c = component;
+    return c ? status_of(instance_enter_event_mode(&c->instance, "fmi2EnterEventMode")) : fmi2Error;
+}
+
+/* It has no discrete states: one call is enough. */
+fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *info)
+{
+    static const fmi2EventInfo nothing = {
+        .newDiscreteStatesNeeded = fmi2False,
+        .terminateSimulation = fmi2False,
+        .nominalsOfContinuousStatesChanged = fmi2False,
+        .valuesOfContinuousStatesChanged = fmi2False,
+        .nextEventTimeDefined = fmi2False,
+        .nextEventTime = 0.0,
+    };
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    if (!info)
+        return refuse_null(c, "fmi2NewDiscreteStates");
+    const enum verdict verdict = instance_new_discrete_states(&c->instance, "fmi2NewDiscreteStates");
+    if (verdict != REFUSED)
+        *info = nothing;
+    return status_of(verdict);
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component component)
+{
+    struct component *c = component;
+    return c ? status_of(instance_enter_continuous_time(&c->instance, "fmi2EnterContinuousTimeMode")) : fmi2Error;
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Boolean no_set_state_before,
+                                       fmi2Boolean *enter_event_mode, fmi2Boolean *terminate)
+{
+    struct component *c = component;
+    (void)no_set_state_before;
+    if (!c)
+        return fmi2Error;
+    if (!enter_event_mode || !terminate)
+        return refuse_null(c, "fmi2CompletedIntegratorStep");
+    const enum verdict verdict = instance_completed_integrator_step(&c->instance, "fmi2CompletedIntegratorStep");
+    if (verdict != REFUSED)
+        *enter_event_mode = *terminate = fmi2False;
+    return status_of(verdict);
+}
+
+fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time)
+{
+    struct component *c = component;
+    return c ? status_of(instance_set_time(&c->instance, "fmi2SetTime", time)) : fmi2Error;
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real states[], size_t n)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    return states ? status_of(instance_set_states(&c->instance, "fmi2SetContinuousStates", states, n))
+                  : refuse_null(c, "fmi2SetContinuousStates");
+}
+
+fmi2Status fmi2GetContinuousStates(fmi2Component component, fmi2Real states[], size_t n)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    return states ? status_of(instance_get_states(&c->instance, "fmi2GetContinuousStates", states, n))
+                  : refuse_null(c, "fmi2GetContinuousStates");
+}
+
+fmi2Status fmi2GetDerivatives(fmi2Component component, fmi2Real derivatives[], size_t n)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    return derivatives ? status_of(instance_get_derivatives(&c->instance, "fmi2GetDerivatives", derivatives, n))
+                       : refuse_null(c, "fmi2GetDerivatives");
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component component, fmi2Real nominals[], size_t n)
+{
+    struct component *c = component;
+    if (!c)
+        return fmi2Error;
+    return nominals
+               ? status_of(instance_get_nominals(&c->instance, "fmi2GetNominalsOfContinuousStates", nominals, n))
+               : refuse_null(c, "fmi2GetNominalsOfContinuousStates");
+}
+
+/* There are none. */
+fmi2Status fmi2GetEventIndicators(fmi2Component component, fmi2Real indicators[], size_t n)
+{
+    struct component *c = component;
+    (void)indicators;
+    if (!c || instance_require_use(&c->instance, "fmi2GetEventIndicators", MODEL_EXCHANGE) == REFUSED)
+        return fmi2Error;
+    return n == 0 ? fmi2OK
+                  : status_of(instance_say(&c->instance, REFUSED, "fmi2GetEventIndicators: %u values: must be 0; there "
+                                                                  "are no event indicators", (unsigned long long)n));
 }
 
 /* ---- the step */

@@ -26,22 +26,31 @@ enum verdict instance_require(struct instance *instance, const char *call, enum 
                         PHASE_NAMES[instance->now.phase], PHASE_NAMES[phase]);
 }
 
+enum verdict instance_require_use(struct instance *instance, const char *call, enum use use)
+{
+    if (instance->now.use == use)
+        return FINE;
+    return instance_say(instance, REFUSED, "%s: must be called of an instance for %s", call,
+                        use == MODEL_EXCHANGE ? "model exchange" : "co-simulation");
+}
+
 enum verdict instance_no_such(struct instance *instance, const char *kind, unsigned reference)
 {
     return instance_say(instance, REFUSED, "value reference %u: must be that of a variable of type %s",
                         (unsigned long long)reference, kind);
 }
 
-bool instance_started(const struct instance *instance)
+bool content_started(const struct content *content)
 {
-    return instance->now.phase == STEPPING || instance->now.phase == TERMINATED;
+    return content->phase != INSTANTIATED && content->phase != INITIALIZING;
 }
 
 /* ---- life cycle */
 
 void instance_reset(struct instance *instance)
 {
-    const struct content empty = {.phase = INSTANTIATED, .stop_time = INFINITY, .moved = true, .acted = true};
+    const struct content empty = {
+        .use = instance->now.use, .phase = INSTANTIATED, .stop_time = INFINITY, .moved = true, .acted = true};
     instance->now = empty;
     instance->last_step = FINE;
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
@@ -52,8 +61,9 @@ void instance_reset(struct instance *instance)
     }
 }
 
-void instance_start(struct instance *instance, teller *tell, void *sink)
+void instance_start(struct instance *instance, enum use use, teller *tell, void *sink)
 {
+    instance->now.use = use;
     instance->tell = tell;
     instance->sink = sink;
     instance_reset(instance);
@@ -159,13 +169,15 @@ enum verdict instance_go(struct instance *instance, const char *call)
 {
     if (instance_require(instance, call, INITIALIZING) == REFUSED || take_up_start_values(instance) == REFUSED)
         return REFUSED;
-    instance->now.phase = STEPPING;
+    instance->now.phase = instance->now.use == MODEL_EXCHANGE ? EVENT_MODE : STEPPING;
     return FINE;
 }
 
 enum verdict instance_terminate(struct instance *instance, const char *call)
 {
-    if (instance_require(instance, call, STEPPING) == REFUSED)
+    const bool exchanges = instance->now.phase == EVENT_MODE || instance->now.phase == CONTINUOUS_TIME;
+    const enum phase last = instance->now.use == MODEL_EXCHANGE ? CONTINUOUS_TIME : STEPPING;
+    if (!exchanges && instance_require(instance, call, last) == REFUSED)
         return REFUSED;
     instance->now.phase = TERMINATED;
     return FINE;
@@ -270,7 +282,7 @@ static enum verdict warn_of_the_step(struct instance *instance)
     return verdict;
 }
 
-static enum verdict warn_of_held_inputs(struct instance *instance, const struct controls *controls)
+enum verdict instance_warn_of_held_inputs(struct instance *instance, const struct controls *controls)
 {
     const struct controls limits = kernel_saturate(controls, &instance->now.craft);
     const double values[] = {controls->thrust, controls->port, controls->starboard};
@@ -357,8 +369,8 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->reals[V_WIND_Y] = end.wind_y;
     enum verdict verdict = count_substeps(instance, stretch.substeps);
     verdict = worse(verdict, warn_of_the_step(instance));
-    verdict = worse(verdict, warn_of_held_inputs(instance, &drive.start));
-    return worse(verdict, warn_of_held_inputs(instance, &end));
+    verdict = worse(verdict, instance_warn_of_held_inputs(instance, &drive.start));
+    return worse(verdict, instance_warn_of_held_inputs(instance, &end));
 }
 
 enum verdict instance_step(struct instance *instance, const char *call, double point, double step)
@@ -379,6 +391,20 @@ static enum verdict check_finite(struct instance *instance, const unsigned *refe
     return FINE;
 }
 
+enum verdict instance_take_up(struct instance *instance)
+{
+    struct content *now = &instance->now;
+    struct craft craft = now->craft;
+    if (now->use != MODEL_EXCHANGE)
+        return FINE;
+    if (now->tuned && make_craft(instance, &craft) == REFUSED)
+        return REFUSED;
+    now->craft = craft;
+    now->tuned = false;
+    now->controls = inputs_of(now->reals);
+    return FINE;
+}
+
 /* Bring what is read of the motion up to the communication point. */
 static enum verdict observe_motion(struct instance *instance)
 {
@@ -386,7 +412,7 @@ static enum verdict observe_motion(struct instance *instance)
     double *reals = now->reals;
     if (!now->moved)
         return FINE;
-    if (!instance_started(instance) && take_up_start_values(instance) == REFUSED)
+    if ((content_started(now) ? instance_take_up(instance) : take_up_start_values(instance)) == REFUSED)
         return REFUSED;
     const struct state *s = &now->state;
     kernel_body_velocity(s, &reals[V_BODY_SURGE], &reals[V_BODY_SWAY]);
@@ -519,6 +545,11 @@ static enum verdict check_real(struct instance *instance, const struct variable 
         return REFUSED;
     if (!isfinite(value))
         return instance_say(instance, REFUSED, "%s = %r: must be a finite number", variable->name, value);
+    if (variable == &VARIABLES[V_SKIRT_FRICTION] && value > 0.0 && instance->now.use == MODEL_EXCHANGE)
+        return instance_say(instance, REFUSED,
+                            "%s = %r: must be 0 in model exchange: a craft that friction stops, holds and lets go is "
+                            "not smooth; use co-simulation",
+                            variable->name, value);
     const char *why = broken_rule(variable->rule, value);
     if (why)
         return instance_say(instance, REFUSED, variable->rule == STEP_SIZE_RULE ? "%s = %r s: %s" : "%s = %r: %s",
@@ -529,9 +560,8 @@ static enum verdict check_real(struct instance *instance, const struct variable 
 /* What is read belongs to the communication point: in step mode it changes with the next step, not now. */
 static void after_set(struct instance *instance, bool parameter)
 {
-    if (instance->now.phase == STEPPING)
-        instance->now.tuned = instance->now.tuned || parameter;
-    else
+    instance->now.tuned = instance->now.tuned || parameter;
+    if (instance->now.phase != STEPPING)
         instance->now.moved = instance->now.acted = true;
 }
 
@@ -677,5 +707,18 @@ enum verdict instance_get_rates(struct instance *instance, const unsigned *refer
     }
     for (size_t i = 0; i < n; i++)
         output_rate(instance->now.reals, references[i], &values[i]);
+    return FINE;
+}
+
+/* ---- all of it */
+
+enum verdict instance_restore(struct instance *instance, const struct content *content)
+{
+    static const char *const uses[] = {"co-simulation", "model exchange"};
+    if (content->use != instance->now.use)
+        return instance_say(instance, REFUSED, "FMU state of an instance for %s: must be that of one for %s",
+                            uses[content->use], uses[instance->now.use]);
+    instance->now = *content;
+    instance->last_step = FINE;
     return FINE;
 }

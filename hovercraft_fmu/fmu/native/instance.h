@@ -1,5 +1,5 @@
-/* One craft behind a co-simulation interface: variables, life cycle, faults, warnings, state. It knows no standard: a
-   face (fmi2.c) translates. What it is given it checks, once; a refused call changes nothing. */
+/* One craft behind an interface for co-simulation or for model exchange: variables, life cycle, faults, warnings, state.
+   It knows no standard: a face (fmi2.c) translates. What it is given it checks, once; a refused call changes nothing. */
 
 #ifndef HOVERCRAFT_INSTANCE_H
 #define HOVERCRAFT_INSTANCE_H
@@ -13,6 +13,9 @@
 
 enum verdict { FINE, WARNED, REFUSED };
 
+/* What the host takes it for: steps, or equations for a solver of its own. */
+enum use { CO_SIMULATION, MODEL_EXCHANGE };
+
 struct instance;
 
 /* Where a message goes; `sink` is the face's. */
@@ -20,16 +23,17 @@ typedef void teller(void *sink, enum verdict verdict, const char *message);
 
 /* All that a call can change, and all that an FMU state is: no pointer in it. */
 struct content {
+    enum use use;                     /* as it was started; a reset keeps it */
     enum phase phase;
-    double time;                      /* s, where the last step ended */
+    double time;                      /* s, where the last step ended; in model exchange as the solver sets it */
     double stop_time;                 /* s, given with the experiment; else infinite */
     double reals[VARIABLE_COUNT];     /* what is read, by value reference */
     int32_t integers[VARIABLE_COUNT];
     double rates[INPUT_COUNT];        /* per s, of the inputs */
     double hosts_tolerance;           /* given with the experiment, it comes before the parameter; else 0 */
     struct state state;
-    struct controls controls;         /* at the end of the last step, before saturation */
-    struct craft craft;               /* of the last step */
+    struct controls controls;         /* at the end of the last step, before saturation; in model exchange now */
+    struct craft craft;               /* of the last step; in model exchange now */
     struct settings settings;
     double proposed;                  /* s, the next step of the adaptive method */
     double stability, rotation;       /* 1, rad: the largest of a sub-step so far */
@@ -48,14 +52,16 @@ struct instance {
 /* What a serialized state takes. */
 size_t instance_serialized_size(void);
 
-void instance_start(struct instance *instance, teller *tell, void *sink);
+void instance_start(struct instance *instance, enum use use, teller *tell, void *sink);
 void instance_reset(struct instance *instance);
 
 /* Say something, and return the verdict. For `format` see text.h. */
 enum verdict instance_say(struct instance *instance, enum verdict verdict, const char *format, ...);
 /* Refused, unless the instance is in this phase. */
 enum verdict instance_require(struct instance *instance, const char *call, enum phase phase);
-bool instance_started(const struct instance *instance);
+/* Refused, unless it was started for this use. */
+enum verdict instance_require_use(struct instance *instance, const char *call, enum use use);
+bool content_started(const struct content *content);
 
 /* `stop_time` is infinite where there is none. */
 enum verdict instance_set_up(struct instance *instance, const char *call, double start_time, bool tolerance_given,
@@ -64,6 +70,31 @@ enum verdict instance_initialize(struct instance *instance, const char *call);
 enum verdict instance_go(struct instance *instance, const char *call);
 enum verdict instance_step(struct instance *instance, const char *call, double point, double step);
 enum verdict instance_terminate(struct instance *instance, const char *call);
+
+/* Model exchange (exchange.c): from initialization it goes to event mode, from there to and fro between that and
+   continuous-time mode. What is read follows states, inputs and parameters at once. It has no events of its own. */
+enum verdict instance_enter_event_mode(struct instance *instance, const char *call);
+enum verdict instance_enter_continuous_time(struct instance *instance, const char *call);
+enum verdict instance_new_discrete_states(struct instance *instance, const char *call);
+enum verdict instance_completed_integrator_step(struct instance *instance, const char *call);
+enum verdict instance_set_time(struct instance *instance, const char *call, double time);
+/* In the order of STATES; `n` must be STATE_COUNT. */
+enum verdict instance_set_states(struct instance *instance, const char *call, const double *values, size_t n);
+enum verdict instance_get_states(struct instance *instance, const char *call, double *values, size_t n);
+enum verdict instance_get_derivatives(struct instance *instance, const char *call, double *values, size_t n);
+enum verdict instance_get_nominals(struct instance *instance, const char *call, double *values, size_t n);
+
+/* The partial derivatives of outputs and of the states' derivatives with respect to states and inputs, for either use,
+   from initialization mode on, where what is read stands: in co-simulation with the controls of the last step. Refused:
+   an unknown or a known that is none of these, what is no finite number, a craft that friction holds. */
+enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns, size_t n_unknowns,
+                                const unsigned *knowns, size_t n_knowns, struct linearization *linearization);
+/* d(unknown)/d(known), of references that were not refused. */
+double instance_partial(const struct linearization *linearization, unsigned unknown, unsigned known);
+/* The sum over the knowns of seeds[k] * d(unknown)/d(known k), for each of the unknowns. */
+enum verdict instance_directional_derivatives(struct instance *instance, const char *call, const unsigned *unknowns,
+                                              size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
+                                              const double *seeds, double *values);
 
 enum verdict instance_get_reals(struct instance *instance, const unsigned *references, size_t n, double *values);
 enum verdict instance_get_integers(struct instance *instance, const unsigned *references, size_t n, int *values);
@@ -78,6 +109,13 @@ enum verdict instance_set_rates(struct instance *instance, const unsigned *refer
 enum verdict instance_get_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
                                 double *values);
 
+/* What exchange.c needs of instance.c: the inputs and the parameters as they are now, taken up where it is in use for
+   model exchange; refused where the parameters contradict one another. And a word where inputs are out of limits. */
+enum verdict instance_take_up(struct instance *instance);
+enum verdict instance_warn_of_held_inputs(struct instance *instance, const struct controls *controls);
+
+/* Take up a content as a whole. Refused: one of another use. */
+enum verdict instance_restore(struct instance *instance, const struct content *content);
 /* `bytes` has instance_serialized_size() bytes. The same on every platform. */
 void instance_serialize(const struct content *content, unsigned char *bytes);
 /* Refused: not complete and unchanged, or of another build. */

@@ -214,8 +214,7 @@ static inline void steer_at(struct load_function *f, double time)
     }
 }
 
-/* m: the mean distance of the points of the skirt's rectangle from its centre. */
-static double friction_radius(const struct craft *craft)
+double kernel_friction_radius(const struct craft *craft)
 {
     const double length = craft->length, width = craft->width;
     const double d = sqrt(length * length + width * width);
@@ -245,7 +244,7 @@ static struct load_function sliding_load_function(const struct drive *drive, con
     struct load_function f = load_function(drive, craft);
     f.slides = true;
     f.force = friction_force(craft);
-    f.radius = friction_radius(craft);
+    f.radius = kernel_friction_radius(craft);
     return f;
 }
 
@@ -323,7 +322,7 @@ static struct friction friction_function(const struct craft *craft, double h)
 {
     struct friction friction = {.rubs = rubs(craft)};
     if (friction.rubs) {
-        const double radius = friction_radius(craft), force = friction_force(craft);
+        const double radius = kernel_friction_radius(craft), force = friction_force(craft);
         friction.radius = radius;
         friction.a = h * (force / craft->mass);
         friction.b = h * (force * radius * radius / craft->inertia);

@@ -91,6 +91,8 @@ static inline double larger(double a, double b)
 }
 
 struct derived kernel_derived(const struct craft *craft);
+/* m: the mean distance of the points of the skirt's rectangle from its centre. */
+double kernel_friction_radius(const struct craft *craft);
 
 struct controls kernel_saturate(const struct controls *controls, const struct craft *craft);
 struct controls kernel_controls_at(const struct drive *drive, double time);

@@ -10,7 +10,7 @@
 
 #include "instance.h"
 
-enum { VERSION = 2, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
+enum { VERSION = 3, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
 static const char MAGIC[] = "HOVERFMU";
 
 enum direction { MEASURE, WRITE, READ };
@@ -71,7 +71,7 @@ static void exchange_state(struct cursor *cursor, struct content *c)
 {
     double *const parts[STATE_COUNT] = {&c->state.x,  &c->state.y,  &c->state.heading,
                                         &c->state.vx, &c->state.vy, &c->state.yaw_rate};
-    const bool started = c->phase == STEPPING || c->phase == TERMINATED;
+    const bool started = content_started(c);
     for (unsigned i = 0; i < STATE_COUNT; i++) {
         double value = started ? *parts[i] : c->reals[STATES[i]];
         exchange_double(cursor, &value);
@@ -93,10 +93,11 @@ static void exchange_craft(struct cursor *cursor, struct craft *craft)
 /* All of the content that cannot be worked out from the rest; the same for writing and reading. */
 static void exchange(struct cursor *cursor, struct content *c)
 {
-    int32_t phase = (int32_t)c->phase, tuned = c->tuned;
+    int32_t use = (int32_t)c->use, phase = (int32_t)c->phase, tuned = c->tuned;
     for (unsigned i = 0; i < VARIABLE_COUNT; i++)
         if (VARIABLES[i].kind != REAL)
             exchange_integer(cursor, &c->integers[i]);
+    exchange_integer(cursor, &use);
     exchange_integer(cursor, &phase);
     exchange_integer(cursor, &tuned);
     exchange_integer(cursor, &c->settings.integrator);
@@ -115,6 +116,7 @@ static void exchange(struct cursor *cursor, struct content *c)
     exchange_double(cursor, &c->proposed);
     exchange_double(cursor, &c->stability);
     exchange_double(cursor, &c->rotation);
+    c->use = use == MODEL_EXCHANGE ? MODEL_EXCHANGE : CO_SIMULATION;
     c->phase = phase >= 0 && phase < PHASE_COUNT ? (enum phase)phase : PHASE_COUNT;
     c->tuned = tuned != 0;
 }
@@ -168,14 +170,22 @@ static bool is_of_this_build(const unsigned char *bytes, size_t size)
            memcmp(bytes + cursor.at, BUILD, BUILD_SIZE) == 0;
 }
 
+static bool is_phase_of_use(const struct content *c)
+{
+    if (c->phase == EVENT_MODE || c->phase == CONTINUOUS_TIME)
+        return c->use == MODEL_EXCHANGE;
+    return c->phase < STEPPING || c->phase == TERMINATED || (c->phase == STEPPING && c->use == CO_SIMULATION);
+}
+
 /* The words are right; whoever can work out a checksum may still have written anything. */
 static bool is_possible(const struct content *c)
 {
     const int32_t most = INTEGRATOR_COUNT;
-    const bool started = c->phase == STEPPING || c->phase == TERMINATED;
+    const bool started = content_started(c);
     const int32_t kept = c->integers[V_INTEGRATOR], used = c->settings.integrator;
-    return c->phase < PHASE_COUNT && kept >= 1 && kept <= most && (!started || (used >= 1 && used <= most)) &&
-           c->reals[V_STEP_SIZE] > 0.0 && (!started || c->settings.step_size > 0.0) && c->integers[V_SUBSTEPS] >= 0;
+    return is_phase_of_use(c) && kept >= 1 && kept <= most && (!started || (used >= 1 && used <= most)) &&
+           c->reals[V_STEP_SIZE] > 0.0 && (!started || c->settings.step_size > 0.0) && c->integers[V_SUBSTEPS] >= 0 &&
+           (c->use == CO_SIMULATION || (c->reals[V_SKIRT_FRICTION] == 0.0 && c->craft.skirt_friction == 0.0));
 }
 
 enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
