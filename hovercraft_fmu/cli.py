@@ -77,7 +77,7 @@ def build(native: bool) -> None:
 
 
 def _print_built(path: Path, flavour: str) -> None:
-    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, FMI 2.0 co-simulation, {flavour}")
+    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, FMI 2.0, {flavour}")
 
 
 @commands.command("simulate")
@@ -233,9 +233,10 @@ def benchmark() -> None:
 @click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "trade", show_default=True)
 def trade(quick: bool, output: Path) -> None:
     """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes."""
-    from .trade import native_costs, work_precision
+    from .trade import model_exchange, native_costs, work_precision
 
     _measure(lambda folder, tell: work_precision.run(folder, quick, tell), output)
+    OUTPUT.print(model_exchange.run(output, quick))
     OUTPUT.print(native_costs.run(output))
 
 

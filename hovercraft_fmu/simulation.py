@@ -472,22 +472,30 @@ CALLBACKS = _callbacks()
 
 
 @contextmanager
-def instantiated(path: Path, description: Any, messages: list[str]) -> Iterator[tuple[str, Any]]:
+def instantiated(
+    path: Path, description: Any, messages: list[str], exchange: bool = False
+) -> Iterator[tuple[str, Any]]:
     """The folder an FMU is extracted to and an instance in it; both are gone afterwards.
 
-    Logging is on, into `messages`: without it pythonfmu's wrapper keeps its messages, even of errors, to itself.
+    For co-simulation, or for model exchange. Logging is on, into `messages`: without it pythonfmu's wrapper keeps its
+    messages, even of errors, to itself.
 
     Raises:
         SimulationError: the FMU cannot be loaded or instantiated.
     """
-    identifier = description.coSimulation.modelIdentifier
+    interface, kind = (
+        (description.modelExchange, fmi2.FMU2Model) if exchange else (description.coSimulation, fmi2.FMU2Slave)
+    )
+    if interface is None:
+        raise SimulationError(f"{path}: must be an FMU for {'model exchange' if exchange else 'co-simulation'}")
+    identifier = interface.modelIdentifier
     name = f"{identifier} {next(INSTANCES)}"
     MESSAGES[name.encode()] = messages
     try:
         with tempfile.TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
             fmpy.extract(path, unzipdir=folder)
             try:
-                instance = fmi2.FMU2Slave(
+                instance = kind(
                     guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName=name
                 )
                 instance.instantiate(callbacks=CALLBACKS, loggingOn=True)

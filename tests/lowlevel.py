@@ -47,10 +47,10 @@ def everything(instance: Any) -> dict[str, float]:
 
 
 @contextmanager
-def one(fmu: Path) -> Iterator[tuple[Any, list[str]]]:
-    """An instance, and the messages that come from it."""
+def one(fmu: Path, exchange: bool = False) -> Iterator[tuple[Any, list[str]]]:
+    """An instance, for co-simulation or model exchange, and the messages that come from it."""
     messages: list[str] = []
-    with instantiated(fmu, read_description(fmu), messages) as (_, instance):
+    with instantiated(fmu, read_description(fmu), messages, exchange) as (_, instance):
         yield instance, messages
 
 

@@ -1,6 +1,6 @@
 """FMI 2.0 co-simulation beyond what the Python FMU can do: ramps, derivatives, status, pointers, refused instances.
 
-What both flavours must do is in test_lifecycle.py."""
+What both flavours must do is in test_lifecycle.py, model exchange in test_exchange.py."""
 
 import math
 import os
@@ -360,10 +360,13 @@ CALLS = {
     "fmi2DeSerializeFMUstate": 4, "fmi2SetRealInputDerivatives": 5, "fmi2GetRealOutputDerivatives": 5,
     "fmi2GetStatus": 3, "fmi2GetRealStatus": 3, "fmi2GetIntegerStatus": 3, "fmi2GetBooleanStatus": 3,
     "fmi2GetStringStatus": 3, "fmi2GetDirectionalDerivative": 7, "fmi2SetDebugLogging": 4,
+    "fmi2NewDiscreteStates": 2, "fmi2CompletedIntegratorStep": 4, "fmi2SetContinuousStates": 3,
+    "fmi2GetContinuousStates": 3, "fmi2GetDerivatives": 3, "fmi2GetNominalsOfContinuousStates": 3,
 }  # fmt: skip
 """Number of arguments of every call that takes pointers."""
 ONLY_AN_INSTANCE = ("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2Reset",
-                    "fmi2CancelStep", "fmi2FreeFMUstate")  # fmt: skip
+                    "fmi2CancelStep", "fmi2FreeFMUstate", "fmi2EnterEventMode",
+                    "fmi2EnterContinuousTimeMode", "fmi2GetEventIndicators")  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -377,6 +380,8 @@ def test_null_arguments_are_refused(name: str, instance: Any, messages: list[str
         rest = [c_int(0), c_void_p(None)]
     elif name == "fmi2SetDebugLogging":
         rest = [c_int(1), c_size_t(1), c_void_p(None)]
+    elif name.endswith(("ContinuousStates", "Derivatives")) and CALLS[name] == 3:
+        rest = [c_void_p(None), c_size_t(6)]
     assert call(c_void_p(instance.component), *rest) == ERROR
     assert messages[-1].startswith(f"{name}: ")
     assert call(c_void_p(None), *rest) == ERROR
@@ -387,6 +392,7 @@ def test_a_null_instance_is_refused(instance: Any) -> None:
     for name in ONLY_AN_INSTANCE:
         assert function(instance, name)(c_void_p(None), c_void_p(None)) == ERROR
     assert function(instance, "fmi2DoStep")(c_void_p(None), c_double(0.0), c_double(0.1), 1) == ERROR
+    assert function(instance, "fmi2SetTime")(c_void_p(None), c_double(0.0)) == ERROR
     arguments = (0, c_double(0.0), c_double(0.0), 0, c_double(0.0))
     assert function(instance, "fmi2SetupExperiment")(c_void_p(None), *arguments) == ERROR
     instance.dll.fmi2FreeInstance(c_void_p(None))
@@ -604,7 +610,8 @@ def test_clean_under_sanitizers_over_the_life_cycle(sanitized: Path) -> None:
     env = {**os.environ, "NATIVE_FMU": str(sanitized), "LD_PRELOAD": ":".join(runtime), "CI": "",
            "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=0"}  # fmt: skip
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/test_lifecycle.py",
-               "tests/test_native.py", "-k", "not python and not sanitize and not other_hosts"]  # fmt: skip
+               "tests/test_native.py", "tests/test_exchange.py", "-k",
+               "not python and not sanitize and not other_hosts"]  # fmt: skip
     done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False, timeout=900)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     assert " failed" not in done.stdout
@@ -619,8 +626,8 @@ library = ctypes.CDLL(sys.argv[1])
 library.fmi2Instantiate.restype = ctypes.c_void_p
 made = ctypes.c_void_p(library.fmi2Instantiate(b"a", 1, sys.argv[2].encode(), None, None, 0, 0))
 libc = ctypes.CDLL(None)
-libc.malloc.restype = ctypes.c_void_p
-print(library.fmi2SetFMUstate(made, ctypes.c_void_p(libc.malloc(16))))
+libc.calloc.restype = ctypes.c_void_p
+print(library.fmi2SetFMUstate(made, ctypes.c_void_p(libc.calloc(1, 16))))
 """
     extract(str(sanitized), unzipdir=str(tmp_path))
     library = tmp_path / "binaries" / "linux64" / f"{NATIVE.identifier}.so"

@@ -28,15 +28,10 @@ SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 FUNCTIONS = set(
     re.findall(
         r"FMI2_Export fmi2\w+TYPE +(fmi2\w+);",
-        re.sub(
-            r"Functions for FMI2 for Model Exchange\n.*?Functions for FMI2 for Co-Simulation\n",
-            "",
-            (Path(fmpy.__file__).parent / "c-code" / "fmi2Functions.h").read_text(encoding="utf-8"),
-            flags=re.DOTALL,
-        ),
+        (Path(fmpy.__file__).parent / "c-code" / "fmi2Functions.h").read_text(encoding="utf-8"),
     )
 )
-"""All that the standard's header has for co-simulation."""
+"""All that the standard's header has."""
 OF_THE_LINKER = {"___dso_handle", "__mh_dylib_header"}
 OF_LIBC = {"calloc", "free", "memcpy", "memset", "memcmp", "strlen", "strcmp"}
 

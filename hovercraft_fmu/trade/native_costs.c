@@ -1,7 +1,7 @@
 /* What an FMU costs a host in C: a line "name value" for each measure, medians of interleaved samples.
 
    native_costs LIBRARY GUID RESOURCES [substeps]
-   With `substeps` also ns a sub-step of each method, beside the same arithmetic with this platform's libm at -O3: a
+   With `substeps` also ns an evaluation in model exchange, and ns a sub-step of each method, beside the same arithmetic with this platform's libm at -O3: a
    plain loop of semi-implicit Euler and one of Dormand-Prince, which must end in the bits of the kernel, and kernel.c
    (compiled into this program with HOVERCRAFT_LIBM). */
 
@@ -35,8 +35,16 @@ struct functions {
     fmi2FreeInstanceTYPE *release;
 };
 
+struct exchange_functions {
+    fmi2EnterContinuousTimeModeTYPE *enter;
+    fmi2SetTimeTYPE *set_time;
+    fmi2SetContinuousStatesTYPE *set_states;
+    fmi2GetDerivativesTYPE *get_derivatives;
+};
+
 struct host {
     struct functions f;
+    struct exchange_functions exchange;
     const char *guid, *resources;
     fmi2Component craft;
     double time; /* s, where the last step ended */
@@ -78,7 +86,7 @@ static void *found(void *library, const char *name)
     return function;
 }
 
-static void load(struct host *host, const char *path)
+static void load(struct host *host, const char *path, bool exchanges)
 {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     demand(library != NULL, "dlopen");
@@ -95,6 +103,13 @@ static void load(struct host *host, const char *path)
         (fmi2ResetTYPE *)found(library, "fmi2Reset"),
         (fmi2FreeInstanceTYPE *)found(library, "fmi2FreeInstance"),
     };
+    if (exchanges)
+        host->exchange = (struct exchange_functions){
+            (fmi2EnterContinuousTimeModeTYPE *)found(library, "fmi2EnterContinuousTimeMode"),
+            (fmi2SetTimeTYPE *)found(library, "fmi2SetTime"),
+            (fmi2SetContinuousStatesTYPE *)found(library, "fmi2SetContinuousStates"),
+            (fmi2GetDerivativesTYPE *)found(library, "fmi2GetDerivatives"),
+        };
 }
 
 static void logger(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
@@ -105,11 +120,11 @@ static void logger(fmi2ComponentEnvironment environment, fmi2String instance, fm
         fprintf(stderr, "%s\n", message);
 }
 
-static fmi2Component made(const struct host *host)
+static fmi2Component made(const struct host *host, fmi2Type type)
 {
     static const fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
-    fmi2Component craft = host->f.instantiate("craft", fmi2CoSimulation, host->guid, host->resources, &callbacks,
-                                              fmi2False, fmi2False);
+    fmi2Component craft = host->f.instantiate("craft", type, host->guid, host->resources, &callbacks, fmi2False,
+                                              fmi2False);
     demand(craft != NULL, "fmi2Instantiate");
     return craft;
 }
@@ -159,6 +174,28 @@ static double time_of_substeps(struct host *host, int method)
     const double spent = now() - begun;
     demand(host->f.count(host->craft, &substeps, 1, &taken) == fmi2OK && taken > 0, "fmi2GetInteger");
     return spent / taken * 1e9;
+}
+
+/* ns an evaluation in model exchange: time, states, derivatives, as a solver asks for them. */
+static double time_of_evaluations(const struct host *host)
+{
+    const struct functions *f = &host->f;
+    const struct exchange_functions *x = &host->exchange;
+    double states[STATE_COUNT] = {0.0, 0.0, 0.3, 0.1, 0.0, 0.01}, derivatives[STATE_COUNT];
+    fmi2Component craft = made(host, fmi2ModelExchange);
+    demand(f->setup(craft, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK && f->enter(craft) == fmi2OK &&
+               f->leave(craft) == fmi2OK && x->enter(craft) == fmi2OK,
+           "initialization for model exchange");
+    const double begun = now();
+    for (int i = 0; i < SUBSTEPS; i++) {
+        demand(x->set_time(craft, i * STEP_SIZE) == fmi2OK && x->set_states(craft, states, STATE_COUNT) == fmi2OK &&
+                   x->get_derivatives(craft, derivatives, STATE_COUNT) == fmi2OK,
+               "an evaluation");
+        states[2] += STEP_SIZE * derivatives[2];
+    }
+    const double spent = now() - begun;
+    f->release(craft);
+    return spent / SUBSTEPS * 1e9;
 }
 
 /* What it is measured against, from rest: the kernel with libm, and plain loops that must come to the same bits. */
@@ -306,6 +343,8 @@ static void measure(struct host *host, bool with_substeps)
             cases[n + 1].samples[k] = time_of_kernel_with_libm(method, &with_libm[method]);
         }
         if (with_substeps) {
+            strcpy(cases[n].name, "evaluation");
+            cases[n++].samples[k] = time_of_evaluations(host);
             strcpy(cases[n].name, "plain_semi_implicit_euler");
             cases[n++].samples[k] = time_of_plain_euler(&plain);
             demand_same(&plain, &with_libm[SEMI_IMPLICIT_EULER]);
@@ -325,12 +364,12 @@ static void measure_instances(const struct host *host)
     double samples[SAMPLES];
     for (int k = 0; k < SAMPLES; k++) {
         const double begun = now();
-        host->f.release(made(host));
+        host->f.release(made(host, fmi2CoSimulation));
         samples[k] = (now() - begun) * 1e6;
     }
     const long before = resident();
     for (int i = 0; i < ALIVE; i++)
-        alive[i] = made(host);
+        alive[i] = made(host, fmi2CoSimulation);
     printf("memory %.9g\n", (double)(resident() - before) / ALIVE);
     for (int i = 0; i < ALIVE; i++)
         host->f.release(alive[i]);
@@ -343,8 +382,8 @@ int main(int argc, char **argv)
     if (argc < 4)
         return 1;
     const double begun = now();
-    load(&host, argv[1]);
-    host.craft = made(&host);
+    load(&host, argv[1], argc > 4);
+    host.craft = made(&host, fmi2CoSimulation);
     printf("load %.9g\n", (now() - begun) * 1e6);
     measure(&host, argc > 4);
     host.f.release(host.craft);

@@ -64,7 +64,13 @@ def measure() -> list[Cost]:
         native, python = build_native_fmu(folder / "Native.fmu"), build_fmu(folder / "Python.fmu")
         calls = _through_fmpy(native, python)
         in_c = _in_c(folder / "native", native, "substeps"), _in_c(folder / "python", python)
-    return [*_substeps(in_c[0]), *_calls("fmpy", *calls), *_calls("C host", *in_c), *_instances(*in_c)]
+    return [
+        *_substeps(in_c[0]),
+        _evaluation(in_c[0]),
+        *_calls("fmpy", *calls),
+        *_calls("C host", *in_c),
+        *_instances(*in_c),
+    ]
 
 
 def _substeps(found: Mapping[str, float]) -> list[Cost]:
@@ -76,6 +82,12 @@ def _substeps(found: Mapping[str, float]) -> list[Cost]:
         for other, text in others.items()
         if f"{other}_{method.name}" in found
     ]
+
+
+def _evaluation(found: Mapping[str, float]) -> Cost:
+    """The loads and the interface of model exchange, beside the loads and the method in co-simulation."""
+    what = "C host: set time and states, get derivatives"
+    return Cost(what, "ns", found["evaluation"], "a quarter of a sub-step of rk4", found["substep_rk4"] / 4.0)
 
 
 def _calls(host: str, native: Mapping[str, float], python: Mapping[str, float]) -> list[Cost]:

@@ -12,7 +12,7 @@
 #include "fmi2Functions.h"
 #include "variables.h"
 
-enum { INSTANCES = 2, SLOTS = 4, MOST = 5, BLOB = 1024, CALLS = 24 };
+enum { INSTANCES = 2, SLOTS = 4, MOST = 5, BLOB = 1024, CALLS = 28 };
 static const double FEW_SUBSTEPS = 2000.0, TOO_MANY = 2e9; /* between them a step would only take long */
 
 struct bytes {
@@ -104,7 +104,7 @@ static fmi2Component made(struct bytes *bytes)
     char guid[16];
     take(bytes, guid, sizeof guid - 1);
     guid[sizeof guid - 1] = '\0';
-    return fmi2Instantiate(how & 1 ? "craft" : NULL, how % 16 == 15 ? fmi2ModelExchange : fmi2CoSimulation,
+    return fmi2Instantiate(how & 1 ? "craft" : NULL, how & 64 ? fmi2ModelExchange : how == 15 ? (fmi2Type)2 : fmi2CoSimulation,
                            how % 32 == 30 ? guid : how % 32 == 28 ? NULL : GUID, NULL,
                            how & 2 ? &callbacks : NULL, fmi2False, how & 4 ? fmi2True : fmi2False);
 }
@@ -190,6 +190,69 @@ static fmi2Status derivatives(fmi2Component craft, struct bytes *bytes, const st
     for (size_t i = 0; i < n && status == fmi2OK; i++)
         demand(world->forged || isfinite(values[i]), "a derivative is not finite");
     return status;
+}
+
+static fmi2Status partial_derivatives(fmi2Component craft, struct bytes *bytes, const struct world *world)
+{
+    const unsigned how = a_byte(bytes);
+    const size_t n = how % MOST, m = how / MOST % MOST;
+    unsigned unknowns[MOST], knowns[MOST];
+    double seeds[MOST], values[MOST];
+    for (size_t i = 0; i < MOST; i++) {
+        unknowns[i] = a_byte(bytes) & 7 ? V_POSE_X + a_byte(bytes) % 16 : a_reference(bytes);
+        knowns[i] = a_byte(bytes) & 7 ? a_byte(bytes) % V_BODY_SURGE : a_reference(bytes);
+        seeds[i] = a_double(bytes);
+    }
+    const fmi2Status status = fmi2GetDirectionalDerivative(craft, unknowns, n, how == 255 ? NULL : knowns, m, seeds,
+                                                           how == 254 ? NULL : values);
+    for (size_t i = 0; i < n && status == fmi2OK; i++)
+        demand(world->forged || isfinite(values[i]), "a directional derivative is not finite");
+    return status;
+}
+
+/* The calls of model exchange, on whatever the instance is for. */
+static fmi2Status exchange(fmi2Component craft, struct bytes *bytes, const struct world *world)
+{
+    const unsigned how = a_byte(bytes), call = how % 16;
+    const size_t n = how < 240 ? STATE_COUNT : how % 16;
+    double values[16] = {0};
+    fmi2EventInfo info;
+    fmi2Boolean event = 7, end = 7;
+    fmi2Status status;
+    switch (call) {
+    case 0:
+    case 1:
+        return fmi2EnterEventMode(craft);
+    case 2:
+    case 3:
+        return fmi2EnterContinuousTimeMode(craft);
+    case 4:
+        status = fmi2NewDiscreteStates(craft, how == 244 ? NULL : &info);
+        demand(status > fmi2Warning || (!info.newDiscreteStatesNeeded && !info.nextEventTimeDefined), "an event");
+        return status;
+    case 5:
+        status = fmi2CompletedIntegratorStep(craft, how & 1, &event, how == 245 ? NULL : &end);
+        demand(status > fmi2Warning || (!event && !end), "an event of the step");
+        return status;
+    case 6:
+        return fmi2SetTime(craft, a_double(bytes));
+    case 7:
+        return fmi2GetNominalsOfContinuousStates(craft, values, n);
+    case 8:
+        return fmi2GetEventIndicators(craft, values, how == 248);
+    case 9:
+    case 10:
+    case 11:
+        for (int i = 0; i < STATE_COUNT; i++)
+            values[i] = a_double(bytes);
+        return fmi2SetContinuousStates(craft, how == 249 ? NULL : values, n);
+    default:
+        status = call < 14 ? fmi2GetDerivatives(craft, how == 252 ? NULL : values, n)
+                           : fmi2GetContinuousStates(craft, how == 254 ? NULL : values, n);
+        for (size_t i = 0; i < n && status == fmi2OK; i++)
+            demand(world->forged || isfinite(values[i]), "a state or its derivative is not finite");
+        return status;
+    }
 }
 
 static fmi2Status others(fmi2Component craft, struct bytes *bytes)
@@ -320,8 +383,7 @@ static fmi2Status called(struct bytes *bytes, struct world *world, fmi2Component
         statuses(*craft, bytes);
         return fmi2OK;
     case 11:
-        return a_byte(bytes) & 1 ? fmi2CancelStep(*craft)
-                                 : fmi2GetDirectionalDerivative(*craft, NULL, 0, NULL, 0, NULL, NULL);
+        return a_byte(bytes) & 1 ? fmi2CancelStep(*craft) : partial_derivatives(*craft, bytes, world);
     case 12:
     case 13:
         return integers(*craft, bytes);
@@ -336,6 +398,11 @@ static fmi2Status called(struct bytes *bytes, struct world *world, fmi2Component
     case 20:
     case 21:
         return reals(*craft, bytes, world);
+    case 22:
+    case 23:
+    case 24:
+    case 25:
+        return exchange(*craft, bytes, world);
     default:
         return step(*craft, bytes);
     }

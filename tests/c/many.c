@@ -1,5 +1,5 @@
 /* 8 threads with 1000 instances each, all alive at once in a thread, each with its own controls: every one must end
-   where the same controls end in a lone instance. */
+   where the same controls end in a lone instance. One in five is in model exchange, with a step of Euler's. */
 
 #include <pthread.h>
 #include <stdio.h>
@@ -21,18 +21,25 @@ static void demand(int good, const char *what)
     }
 }
 
+static int exchanges(int kind)
+{
+    return kind % 5 == 4;
+}
+
 static fmi2Component made(int kind)
 {
     static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER}, method = V_INTEGRATOR;
     const double controls[] = {kind % 11, kind % 7 / 7.0, kind % 5 / 5.0};
     const int number = kind % 4 + 1;
-    fmi2Component craft = fmi2Instantiate("craft", fmi2CoSimulation, GUID, "", NULL, fmi2False, fmi2False);
+    const fmi2Type type = exchanges(kind) ? fmi2ModelExchange : fmi2CoSimulation;
+    fmi2Component craft = fmi2Instantiate("craft", type, GUID, "", NULL, fmi2False, fmi2False);
     demand(craft != NULL, "fmi2Instantiate");
     demand(fmi2SetInteger(craft, &method, 1, &number) == fmi2OK, "fmi2SetInteger");
     demand(fmi2SetupExperiment(craft, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK, "fmi2SetupExperiment");
     demand(fmi2EnterInitializationMode(craft) == fmi2OK, "fmi2EnterInitializationMode");
     demand(fmi2ExitInitializationMode(craft) == fmi2OK, "fmi2ExitInitializationMode");
     demand(fmi2SetReal(craft, inputs, 3, controls) == fmi2OK, "fmi2SetReal");
+    demand(!exchanges(kind) || fmi2EnterContinuousTimeMode(craft) == fmi2OK, "fmi2EnterContinuousTimeMode");
     return craft;
 }
 
@@ -44,9 +51,23 @@ static void finish(fmi2Component craft, double results[RESULTS])
     fmi2FreeInstance(craft);
 }
 
-static void step(fmi2Component craft, int k)
+static void exchange(fmi2Component craft, int k)
 {
-    demand(fmi2DoStep(craft, k * 0.05, 0.05, fmi2True) == fmi2OK, "fmi2DoStep");
+    double states[RESULTS], rates[RESULTS];
+    demand(fmi2SetTime(craft, k * 0.05) == fmi2OK && fmi2GetContinuousStates(craft, states, RESULTS) == fmi2OK &&
+               fmi2GetDerivatives(craft, rates, RESULTS) == fmi2OK,
+           "fmi2GetDerivatives");
+    for (int i = 0; i < RESULTS; i++)
+        states[i] += 0.05 * rates[i];
+    demand(fmi2SetContinuousStates(craft, states, RESULTS) == fmi2OK, "fmi2SetContinuousStates");
+}
+
+static void step(fmi2Component craft, int kind, int k)
+{
+    if (exchanges(kind))
+        exchange(craft, k);
+    else
+        demand(fmi2DoStep(craft, k * 0.05, 0.05, fmi2True) == fmi2OK, "fmi2DoStep");
 }
 
 static void *drive(void *unused)
@@ -59,7 +80,7 @@ static void *drive(void *unused)
         craft[i] = made(i % KINDS);
     for (int k = 0; k < STEPS; k++)
         for (int i = 0; i < INSTANCES; i++)
-            step(craft[i], k);
+            step(craft[i], i % KINDS, k);
     for (int i = 0; i < INSTANCES; i++) {
         finish(craft[i], results);
         demand(memcmp(results, expected[i % KINDS], size) == 0, "an instance ended elsewhere");
@@ -74,7 +95,7 @@ int main(void)
     for (int kind = 0; kind < KINDS; kind++) {
         fmi2Component craft = made(kind);
         for (int k = 0; k < STEPS; k++)
-            step(craft, k);
+            step(craft, kind, k);
         finish(craft, expected[kind]);
     }
     for (int i = 0; i < THREADS; i++)

@@ -714,10 +714,11 @@ enum verdict instance_get_rates(struct instance *instance, const unsigned *refer
 
 enum verdict instance_restore(struct instance *instance, const struct content *content)
 {
-    static const char *const uses[] = {"co-simulation", "model exchange"};
-    if (content->use != instance->now.use)
+    const bool exchange = content->use == MODEL_EXCHANGE;
+    if (exchange != (instance->now.use == MODEL_EXCHANGE))
         return instance_say(instance, REFUSED, "FMU state of an instance for %s: must be that of one for %s",
-                            uses[content->use], uses[instance->now.use]);
+                            exchange ? "model exchange" : "co-simulation",
+                            exchange ? "co-simulation" : "model exchange");
     instance->now = *content;
     instance->last_step = FINE;
     return FINE;
