@@ -731,7 +731,7 @@ def test_fmpy_alone_holds_ramps_over_an_output_interval(native_fmu: Path) -> Non
 def test_what_the_fmu_says_to_the_solver_is_told(shared: tuple[Any, list[str]]) -> None:
     """CVode is C: an exception of fmpy's does not come through it."""
     scene = replace(SCENES["launch"], rows=held(STOP_TIME, (0.0, 99.0, 0.0, 0.0)))
-    with pytest.raises(SimulationError, match="thrust = 99.0: is outside its limits and is held at 10.0"):
+    with pytest.raises(SimulationError, match=r"thrust = 99\.0: is outside its limits"):
         solved(Calls(shared[0], scene, shared[1]), 1e-6)
 
 

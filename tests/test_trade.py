@@ -10,10 +10,11 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from hovercraft_fmu.cli import commands
+from hovercraft_fmu.fmu.native_package import has_compiler
 from hovercraft_fmu.model.integrators import INTEGRATORS
-from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.scenes import SCENES, Scene
 from hovercraft_fmu.simulation import schedule
-from hovercraft_fmu.trade import native_costs
+from hovercraft_fmu.trade import model_exchange, native_costs
 from hovercraft_fmu.trade.reference import reference_end
 from hovercraft_fmu.trade.rows import Setting
 from hovercraft_fmu.trade.work_precision import (
@@ -100,6 +101,22 @@ def test_the_command(tmp_path: Path) -> None:
         assert {f"{method.name}: a sub-step" for method in INTEGRATORS} <= {row["what"] for row in costs}
         plain = [row["what"] for row in costs if row["compared_with"].startswith("plain C loop")]
         assert plain == ["semi_implicit_euler: a sub-step", "adaptive: a sub-step"]
+    if has_compiler():
+        chosen, runs, before = (
+            records(folder / name)
+            for folder, name in (
+                (tmp_path, "exchange.csv"),
+                (tmp_path, "exchange_runs.csv"),
+                (RESULTS, "exchange_runs.csv"),
+            )
+        )
+        assert [float(row["accuracy_m"]) for row in chosen] == list(model_exchange.ACCURACIES)
+        assert {row["scene"] for row in before} == {scene.name for scene in model_exchange.SMOOTH}
+        committed_runs = [row for row in before if row["scene"] == "turn"]
+        for ours, committed in zip(runs, committed_runs, strict=True):
+            assert ours["solver"] == committed["solver"]
+            assert float(ours["error"]) <= 2.0 * float(committed["error"]) + 1e-10
+            assert float(ours["cost"]) > 0.0 < float(ours["evaluations"])
     # what is committed was written by the same command, and tells the same of the errors
     for ours, committed in zip(advice, records(RESULTS / "advice.csv"), strict=True):
         assert float(committed["position_error"]) <= float(committed["accuracy_m"])
@@ -109,6 +126,24 @@ def test_the_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["advice.md", "native.md"])
 def test_the_readme_shows_what_is_committed(name: str) -> None:
     assert (RESULTS / name).read_text(encoding="utf-8") in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("scene", model_exchange.SMOOTH, ids=lambda scene: scene.name)
+def test_stretches_are_the_controls_of_the_scene(scene: Scene) -> None:
+    """At any time, and without a gap; outputs are read at least every half second."""
+    names = (scene.signals.dtype.names or ())[1:]
+    times = np.linspace(0.01, 59.99, 997)
+    parts = list(model_exchange.stretches(scene))
+    assert [part.begin for part in parts] == [0.0, *(part.end for part in parts[:-1])]
+    for time in times:
+        part = next(part for part in parts if part.begin <= time < part.end)
+        expected = [
+            np.interp(time, scene.signals["time"], scene.signals[name]) for name in scene.signals.dtype.names[1:]
+        ]
+        assert part.at(time)[: len(expected)] == pytest.approx(expected, abs=1e-12)
+    points = [point for part in parts for point in part.points()]
+    assert 0.0 < min(np.diff([0.0, *points])) <= max(np.diff([0.0, *points])) <= 0.5
+    assert points[-1] == 60.0
 
 
 def test_what_the_native_fmu_costs_is_said_where_it_cannot_be_measured(

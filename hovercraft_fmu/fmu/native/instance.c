@@ -40,7 +40,7 @@ enum verdict instance_no_such(struct instance *instance, const char *kind, unsig
                         (unsigned long long)reference, kind);
 }
 
-bool content_started(const struct content *content)
+bool instance_has_started(const struct content *content)
 {
     return content->phase != INSTANTIATED && content->phase != INITIALIZING;
 }
@@ -412,7 +412,7 @@ static enum verdict observe_motion(struct instance *instance)
     double *reals = now->reals;
     if (!now->moved)
         return FINE;
-    if ((content_started(now) ? instance_take_up(instance) : take_up_start_values(instance)) == REFUSED)
+    if ((instance_has_started(now) ? instance_take_up(instance) : take_up_start_values(instance)) == REFUSED)
         return REFUSED;
     const struct state *s = &now->state;
     kernel_body_velocity(s, &reals[V_BODY_SURGE], &reals[V_BODY_SWAY]);

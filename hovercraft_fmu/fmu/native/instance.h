@@ -61,7 +61,7 @@ enum verdict instance_say(struct instance *instance, enum verdict verdict, const
 enum verdict instance_require(struct instance *instance, const char *call, enum phase phase);
 /* Refused, unless it was started for this use. */
 enum verdict instance_require_use(struct instance *instance, const char *call, enum use use);
-bool content_started(const struct content *content);
+bool instance_has_started(const struct content *content);
 
 /* `stop_time` is infinite where there is none. */
 enum verdict instance_set_up(struct instance *instance, const char *call, double start_time, bool tolerance_given,

@@ -71,7 +71,7 @@ static void exchange_state(struct cursor *cursor, struct content *c)
 {
     double *const parts[STATE_COUNT] = {&c->state.x,  &c->state.y,  &c->state.heading,
                                         &c->state.vx, &c->state.vy, &c->state.yaw_rate};
-    const bool started = content_started(c);
+    const bool started = instance_has_started(c);
     for (unsigned i = 0; i < STATE_COUNT; i++) {
         double value = started ? *parts[i] : c->reals[STATES[i]];
         exchange_double(cursor, &value);
@@ -181,7 +181,7 @@ static bool is_phase_of_use(const struct content *c)
 static bool is_possible(const struct content *c)
 {
     const int32_t most = INTEGRATOR_COUNT;
-    const bool started = content_started(c);
+    const bool started = instance_has_started(c);
     const int32_t kept = c->integers[V_INTEGRATOR], used = c->settings.integrator;
     return is_phase_of_use(c) && kept >= 1 && kept <= most && (!started || (used >= 1 && used <= most)) &&
            c->reals[V_STEP_SIZE] > 0.0 && (!started || c->settings.step_size > 0.0) && c->integers[V_SUBSTEPS] >= 0 &&
