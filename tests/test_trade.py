@@ -137,9 +137,7 @@ def test_stretches_are_the_controls_of_the_scene(scene: Scene) -> None:
     assert [part.begin for part in parts] == [0.0, *(part.end for part in parts[:-1])]
     for time in times:
         part = next(part for part in parts if part.begin <= time < part.end)
-        expected = [
-            np.interp(time, scene.signals["time"], scene.signals[name]) for name in scene.signals.dtype.names[1:]
-        ]
+        expected = [np.interp(time, scene.signals["time"], scene.signals[name]) for name in names]
         assert part.at(time)[: len(expected)] == pytest.approx(expected, abs=1e-12)
     points = [point for part in parts for point in part.points()]
     assert 0.0 < min(np.diff([0.0, *points])) <= max(np.diff([0.0, *points])) <= 0.5
