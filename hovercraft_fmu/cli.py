@@ -232,7 +232,10 @@ def benchmark() -> None:
 @click.option("--quick", is_flag=True, help="One scene, one repeat: half a minute instead of minutes.")
 @click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "trade", show_default=True)
 def trade(quick: bool, output: Path) -> None:
-    """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes."""
+    """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes.
+
+    And what a solver of the host's costs beside the methods of the native FMU.
+    """
     from .trade import model_exchange, native_costs, work_precision
 
     _measure(lambda folder, tell: work_precision.run(folder, quick, tell), output)

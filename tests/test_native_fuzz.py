@@ -20,19 +20,35 @@ def test_twenty_seconds_without_a_finding(tmp_path: Path) -> None:
     assert int(done[1]) > 10_000
 
 
-def test_it_would_find_a_refused_call_that_changes_something(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A test of the test: an instance whose inputs are set before all of them are checked."""
+SPOILED = {
+    "instance.c": (
+        "    for (size_t i = 0; i < n; i++) { /* all are checked before one is set */\n",
+        "        if (is_real(references[i]) && input_of(references[i]) < INPUT_COUNT)\n"
+        "            instance->now.reals[references[i]] = 1.0;\n",
+    ),
+    "exchange.c": (
+        "    struct content *now = &instance->now;\n",
+        "    if (now->phase == CONTINUOUS_TIME && n > 0 && isfinite(values[0]))\n"
+        "        now->state.x = values[0], now->moved = true;\n",
+    ),
+}
+"""File: a line before inputs, or states, are all checked, and one that sets some already there."""
+
+
+@pytest.mark.parametrize("file", SPOILED)
+def test_it_would_find_a_refused_call_that_changes_something(
+    file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A test of the test: an instance that sets what it has not yet checked."""
     if missing := fuzz.missing():
         pytest.skip(missing)
     whole = written_sources
 
     def spoiled(folder: Path) -> Path:
-        path = whole(folder) / "instance.c"
+        path = whole(folder) / file
         text = path.read_text(encoding="utf-8")
-        check = "    for (size_t i = 0; i < n; i++) { /* all are checked before one is set */\n"
-        assert check in text
-        early = "        if (is_real(references[i]) && input_of(references[i]) < INPUT_COUNT)\n"
-        early += "            instance->now.reals[references[i]] = 1.0;\n"
+        check, early = SPOILED[file]
+        assert text.count(check) == 1
         path.write_text(text.replace(check, check + early), encoding="utf-8")
         return folder
 

@@ -104,9 +104,16 @@ static fmi2Component made(struct bytes *bytes)
     char guid[16];
     take(bytes, guid, sizeof guid - 1);
     guid[sizeof guid - 1] = '\0';
-    return fmi2Instantiate(how & 1 ? "craft" : NULL, how & 64 ? fmi2ModelExchange : how == 15 ? (fmi2Type)2 : fmi2CoSimulation,
-                           how % 32 == 30 ? guid : how % 32 == 28 ? NULL : GUID, NULL,
-                           how & 2 ? &callbacks : NULL, fmi2False, how & 4 ? fmi2True : fmi2False);
+    const fmi2Type type = how & 64 ? fmi2ModelExchange : how == 15 ? (fmi2Type)2 : fmi2CoSimulation;
+    fmi2Component craft = fmi2Instantiate(how & 1 ? "craft" : NULL, type,
+                                          how % 32 == 30 ? guid : how % 32 == 28 ? NULL : GUID, NULL,
+                                          how & 2 ? &callbacks : NULL, fmi2False, how & 4 ? fmi2True : fmi2False);
+    if (craft && how & 128) { /* half of them are past their start already */
+        demand(fmi2EnterInitializationMode(craft) == fmi2OK && fmi2ExitInitializationMode(craft) == fmi2OK,
+               "initialization");
+        demand(type == fmi2CoSimulation || fmi2EnterContinuousTimeMode(craft) == fmi2OK, "continuous-time mode");
+    }
+    return craft;
 }
 
 static double real_of(fmi2Component craft, unsigned reference)

@@ -4,17 +4,9 @@
 
 /* ---- phases */
 
-static enum verdict require_either(struct instance *instance, const char *call, enum phase one, enum phase other)
-{
-    if (instance->now.phase == one || instance->now.phase == other)
-        return FINE;
-    return instance_say(instance, REFUSED, "%s in state '%s': must be called in state '%s' or '%s'", call,
-                        PHASE_NAMES[instance->now.phase], PHASE_NAMES[one], PHASE_NAMES[other]);
-}
-
 enum verdict instance_enter_event_mode(struct instance *instance, const char *call)
 {
-    if (require_either(instance, call, EVENT_MODE, CONTINUOUS_TIME) == REFUSED)
+    if (instance_require_either(instance, call, EVENT_MODE, CONTINUOUS_TIME) == REFUSED)
         return REFUSED;
     instance->now.phase = EVENT_MODE;
     return FINE;
@@ -53,7 +45,7 @@ enum verdict instance_completed_integrator_step(struct instance *instance, const
 
 enum verdict instance_set_time(struct instance *instance, const char *call, double time)
 {
-    if (require_either(instance, call, EVENT_MODE, CONTINUOUS_TIME) == REFUSED)
+    if (instance_require_either(instance, call, EVENT_MODE, CONTINUOUS_TIME) == REFUSED)
         return REFUSED;
     if (!isfinite(time))
         return instance_say(instance, REFUSED, "time = %r s: must be a finite number", time);

@@ -26,6 +26,14 @@ enum verdict instance_require(struct instance *instance, const char *call, enum 
                         PHASE_NAMES[instance->now.phase], PHASE_NAMES[phase]);
 }
 
+enum verdict instance_require_either(struct instance *instance, const char *call, enum phase one, enum phase other)
+{
+    if (instance->now.phase == one || instance->now.phase == other)
+        return FINE;
+    return instance_say(instance, REFUSED, "%s in state '%s': must be called in state '%s' or '%s'", call,
+                        PHASE_NAMES[instance->now.phase], PHASE_NAMES[one], PHASE_NAMES[other]);
+}
+
 enum verdict instance_require_use(struct instance *instance, const char *call, enum use use)
 {
     if (instance->now.use == use)
@@ -175,9 +183,8 @@ enum verdict instance_go(struct instance *instance, const char *call)
 
 enum verdict instance_terminate(struct instance *instance, const char *call)
 {
-    const bool exchanges = instance->now.phase == EVENT_MODE || instance->now.phase == CONTINUOUS_TIME;
-    const enum phase last = instance->now.use == MODEL_EXCHANGE ? CONTINUOUS_TIME : STEPPING;
-    if (!exchanges && instance_require(instance, call, last) == REFUSED)
+    if ((instance->now.use == MODEL_EXCHANGE ? instance_require_either(instance, call, EVENT_MODE, CONTINUOUS_TIME)
+                                             : instance_require(instance, call, STEPPING)) == REFUSED)
         return REFUSED;
     instance->now.phase = TERMINATED;
     return FINE;

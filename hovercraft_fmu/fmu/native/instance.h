@@ -1,5 +1,5 @@
-/* One craft behind an interface for co-simulation or for model exchange: variables, life cycle, faults, warnings, state.
-   It knows no standard: a face (fmi2.c) translates. What it is given it checks, once; a refused call changes nothing. */
+/* One craft behind an interface for co-simulation or model exchange: variables, life cycle, faults, warnings, state. It
+   knows no standard: a face (fmi2.c) translates. What it is given it checks, once; a refused call changes nothing. */
 
 #ifndef HOVERCRAFT_INSTANCE_H
 #define HOVERCRAFT_INSTANCE_H
@@ -59,6 +59,7 @@ void instance_reset(struct instance *instance);
 enum verdict instance_say(struct instance *instance, enum verdict verdict, const char *format, ...);
 /* Refused, unless the instance is in this phase. */
 enum verdict instance_require(struct instance *instance, const char *call, enum phase phase);
+enum verdict instance_require_either(struct instance *instance, const char *call, enum phase one, enum phase other);
 /* Refused, unless it was started for this use. */
 enum verdict instance_require_use(struct instance *instance, const char *call, enum use use);
 bool instance_has_started(const struct content *content);
@@ -87,8 +88,9 @@ enum verdict instance_get_nominals(struct instance *instance, const char *call, 
 /* The partial derivatives of outputs and of the states' derivatives with respect to states and inputs, for either use,
    from initialization mode on, where what is read stands: in co-simulation with the controls of the last step. Refused:
    an unknown or a known that is none of these, what is no finite number, a craft that friction holds. */
-enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns, size_t n_unknowns,
-                                const unsigned *knowns, size_t n_knowns, struct linearization *linearization);
+enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns,
+                                size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
+                                struct linearization *linearization);
 /* d(unknown)/d(known), of references that were not refused. */
 double instance_partial(const struct linearization *linearization, unsigned unknown, unsigned known);
 /* The sum over the knowns of seeds[k] * d(unknown)/d(known k), for each of the unknowns. */

@@ -63,8 +63,9 @@ double instance_partial(const struct linearization *linearization, unsigned unkn
     return unknown == known ? 1.0 : 0.0; /* a state; the velocities are derivatives, too */
 }
 
-enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns, size_t n_unknowns,
-                                const unsigned *knowns, size_t n_knowns, struct linearization *linearization)
+enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns,
+                                size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
+                                struct linearization *linearization)
 {
     const struct content *now = &instance->now;
     if (now->phase == INSTANTIATED)
