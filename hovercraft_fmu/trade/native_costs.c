@@ -2,8 +2,8 @@
 
    native_costs LIBRARY GUID RESOURCES [substeps]
    With `substeps` also ns an evaluation in model exchange, and ns a sub-step of each method, beside the same arithmetic
-   with this platform's libm at -O3: a plain loop of semi-implicit Euler and one of Dormand-Prince, which must end in the bits of the kernel, and kernel.c
-   (compiled into this program with HOVERCRAFT_LIBM). */
+   with this platform's libm at -O3: a plain loop of semi-implicit Euler and one of Dormand-Prince, which must end in the
+   bits of the kernel, and kernel.c (compiled into this program with HOVERCRAFT_LIBM). */
 
 #include <dlfcn.h>
 #include <math.h>
