@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from ._version import __version__
+from .fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from .fmu.native_package import build_native_fmu, has_compiler
 from .fmu.package import build_fmu
 from .model.craft import PRESETS
@@ -63,21 +64,26 @@ def commands(context: click.Context) -> None:
 
 @commands.command()
 @click.option("--native", is_flag=True, help="The native FMU alone.")
-def build(native: bool) -> None:
+@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="With --native: FMI 2.0 (the default) or 3.0.")
+def build(native: bool, fmi: str) -> None:
     """Write build/Hovercraft.fmu and, where its compiler is installed, build/HovercraftNative.fmu.
 
-    The compiler of the native FMU: pip install 'hovercraft-fmu[native]'.
+    With --native --fmi 3: build/HovercraftNative3.fmu. The compiler of the native FMUs: pip install
+    'hovercraft-fmu[native]'.
     """
+    if fmi == "3" and not native:
+        raise click.UsageError("--fmi 3: must be given with --native; the Python FMU is FMI 2.0")
     if not native:
-        _print_built(build_fmu(), "Python")
+        _print_built(build_fmu(), PYTHON, "Python")
     if native or has_compiler():
-        _print_built(build_native_fmu(), "native")
+        flavour = NATIVE3 if fmi == "3" else NATIVE
+        _print_built(build_native_fmu(flavour=flavour), flavour, "native")
     else:
         OUTPUT.print("no native FMU: its compiler is not installed: pip install 'hovercraft-fmu\\[native]'")
 
 
-def _print_built(path: Path, flavour: str) -> None:
-    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, FMI 2.0, {flavour}")
+def _print_built(path: Path, flavour: Flavour, language: str) -> None:
+    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, FMI {flavour.fmi}.0, {language}")
 
 
 @commands.command("simulate")

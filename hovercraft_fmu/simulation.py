@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from math import isclose, isfinite
 from pathlib import Path
 from typing import Any, TypeAlias, cast
@@ -16,7 +17,7 @@ import fmpy
 import fmpy.simulation
 import fmpy.util
 import numpy as np
-from fmpy import fmi2
+from fmpy import fmi2, fmi3
 from numpy.typing import NDArray
 
 from .fmu.description import COMMUNICATION_STEP, MODEL_NAME, STOP_TIME
@@ -444,8 +445,8 @@ def read_description(path: Path, validate: bool = True) -> Any:
         description = fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
         raise ValueError(f"{path}: must be an FMU with a valid model description; {error}") from error
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        raise ValueError(f"{path}: must be an FMU for co-simulation, FMI 2.0")
+    if description.fmiVersion not in ("2.0", "3.0") or description.coSimulation is None:
+        raise ValueError(f"{path}: must be an FMU for co-simulation, FMI 2.0 or 3.0")
     return description
 
 
@@ -457,6 +458,10 @@ INSTANCES = itertools.count(1)
 def _log(_environment: object, name: bytes, status: int, _category: bytes, message: bytes) -> None:
     if status and name in MESSAGES:
         MESSAGES[name].append(plain(message.decode(errors="replace")))
+
+
+def _log_3(name: bytes, environment: object, status: int, category: bytes, message: bytes) -> None:
+    _log(environment, name, status, category, message)
 
 
 def _callbacks() -> Any:
@@ -483,22 +488,16 @@ def instantiated(
     Raises:
         SimulationError: the FMU cannot be loaded or instantiated.
     """
-    interface, kind = (
-        (description.modelExchange, fmi2.FMU2Model) if exchange else (description.coSimulation, fmi2.FMU2Slave)
-    )
+    interface = description.modelExchange if exchange else description.coSimulation
     if interface is None:
         raise SimulationError(f"{path}: must be an FMU for {'model exchange' if exchange else 'co-simulation'}")
-    identifier = interface.modelIdentifier
-    name = f"{identifier} {next(INSTANCES)}"
+    name = f"{interface.modelIdentifier} {next(INSTANCES)}"
     MESSAGES[name.encode()] = messages
     try:
         with tempfile.TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
             fmpy.extract(path, unzipdir=folder)
             try:
-                instance = kind(
-                    guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName=name
-                )
-                instance.instantiate(callbacks=CALLBACKS, loggingOn=True)
+                instance = _instance(folder, description, name, exchange)
             except Exception as error:  # fmpy raises plain exceptions here
                 raise SimulationError("; ".join(messages) or f"{path}: {error}") from error
             try:
@@ -507,6 +506,24 @@ def instantiated(
                 instance.freeInstance()
     finally:
         del MESSAGES[name.encode()]
+
+
+def _instance(folder: str, description: Any, name: str, exchange: bool) -> Any:
+    """fmpy's, of either standard; what it says goes to MESSAGES."""
+    interface = description.modelExchange if exchange else description.coSimulation
+    arguments = {
+        "guid": description.guid,
+        "unzipDirectory": folder,
+        "modelIdentifier": interface.modelIdentifier,
+        "instanceName": name,
+    }
+    if description.fmiVersion == "2.0":
+        instance = (fmi2.FMU2Model if exchange else fmi2.FMU2Slave)(**arguments)
+        instance.instantiate(callbacks=CALLBACKS, loggingOn=True)
+    else:  # fmpy hands no environment on: the callback knows the name itself
+        instance = (fmi3.FMU3Model if exchange else fmi3.FMU3Slave)(**arguments)
+        instance.instantiate(logMessage=partial(_log_3, name.encode()), loggingOn=True)
+    return instance
 
 
 def plain(message: str) -> str:

@@ -18,7 +18,7 @@ from . import hosts
 from .simulation import SimulationError, instantiated, read_description
 
 STEPS = 5
-SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
+SCHEMAS = Path(fmpy.__file__).parent / "schema"
 
 
 class Check(NamedTuple):
@@ -38,7 +38,7 @@ class Check(NamedTuple):
 
 
 def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
-    """Run every check on a FMI 2.0 FMU for co-simulation, and for model exchange too; one Check each, as it is done.
+    """Run every check on an FMU, FMI 2.0 or 3.0: for co-simulation, and for model exchange too; one Check each, as it is done.
 
     Raises:
         FileNotFoundError: no such file.
@@ -48,7 +48,8 @@ def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes one")
     description = read_description(path, validate=False)
-    yield Check("lxml", etree.__version__, "XML schema of FMI 2.0", _schema_problems(path))
+    version = description.fmiVersion
+    yield Check("lxml", etree.__version__, f"XML schema of FMI {version}", _schema_problems(path, version))
     problems = list(fmpy.validation.validate_fmu(str(path)))
     yield Check("fmpy", fmpy.__version__, "names, units, starts, model structure", problems)
     what = f"load, initialize, {STEPS} steps, read all outputs, free"
@@ -63,7 +64,7 @@ def validate_elsewhere(path: str | os.PathLike[str]) -> Iterator[Check]:
     """The checkers and hosts that others wrote, where they are installed; for the hovercraft FMU only."""
     path = Path(path)
     others = hosts.hosts_of(path)
-    toolbox = others["fmucontainer"]
+    toolbox = hosts.HOSTS["fmucontainer"]
     what, missing = "fmutool -check: schema and semantics", toolbox.missing()
     version = "" if missing else toolbox.version()
     yield Check("fmu-manipulation-toolbox", version, what, [] if missing else _fmutool_problems(path), missing)
@@ -93,11 +94,20 @@ def _fmutool_problems(path: Path) -> list[str]:
     return problems or ([f"exit status {done.returncode}"] if done.returncode else [])
 
 
-def _schema_problems(path: Path) -> list[str]:
-    schema = etree.XMLSchema(file=str(SCHEMA))
+def _schema_problems(path: Path, version: str) -> list[str]:
+    """Of the model description and, in FMI 3.0, of what else is XML."""
+    fmi = f"fmi{version[0]}"
+    schemas = {"modelDescription.xml": f"{fmi}ModelDescription.xsd"}
+    if fmi == "fmi3":
+        schemas["sources/buildDescription.xml"] = "fmi3BuildDescription.xsd"
+        schemas["terminalsAndIcons/terminalsAndIcons.xml"] = "fmi3TerminalsAndIcons.xsd"
+    problems = []
     with zipfile.ZipFile(path) as archive:
-        schema.validate(etree.fromstring(archive.read("modelDescription.xml")))
-    return [f"line {error.line}: {error.message}" for error in schema.error_log]
+        for name in sorted(schemas.keys() & set(archive.namelist())):
+            schema = etree.XMLSchema(file=str(SCHEMAS / fmi / schemas[name]))
+            schema.validate(etree.fromstring(archive.read(name)))
+            problems += [f"{name}, line {error.line}: {error.message}" for error in schema.error_log]
+    return problems
 
 
 def _run_problems(path: Path, description: Any, exchange: bool = False) -> list[str]:

@@ -1,12 +1,13 @@
-"""The table of variables -> modelDescription.xml, for both flavours of the FMU."""
+"""The table of variables -> modelDescription.xml, for every flavour of the FMU: FMI 2.0 or 3.0."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Literal
 from xml.etree.ElementTree import Element, SubElement
 
 from .._version import RELEASE_DATE, __version__
-from .interface import CRAFT_PARAMETERS, DERIVATIVES, INPUTS, STATES, VARIABLES, Model, Variable
+from .interface import CRAFT_PARAMETERS, DERIVATIVES, INPUTS, STATES, TIME, VARIABLES, Kind, Model, Variable
 
 MODEL_NAME = "Hovercraft"
 DESCRIPTION = (
@@ -35,10 +36,40 @@ CAPABILITIES = {
     "canRunAsynchronuously": "false",  # sic: the schema spells it so
 }
 NATIVE_CAPABILITIES = {"canNotUseMemoryManagementFunctions": "false", "providesDirectionalDerivative": "true"}
+CAPABILITIES_3 = {
+    "needsExecutionTool": "false",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "providesDirectionalDerivatives": "true",
+    "providesAdjointDerivatives": "true",
+    "providesPerElementDependencies": "false",
+    "providesEvaluateDiscreteStates": "false",
+}
+"""Of FMI 3.0, whatever the interface. Intermediate update, early return and clocks: nothing that could check them."""
+SOURCES = (
+    "exchange.c",
+    "instance.c",
+    "kernel.c",
+    "linearization.c",
+    "logarithm.c",
+    "memory.c",
+    "partials.c",
+    "serialize.c",
+    "text.c",
+    "trig.c",
+)
+"""Whatever the standard."""
 LOG_CATEGORIES = {
     "logStatusWarning": "What the run survives but its user should know",
     "logStatusError": "A call that was refused",
     "logAll": "Everything",
+}
+FMI_3_TYPES: Mapping[Kind, str] = {
+    "Real": "Float64",
+    "Integer": "Int32",
+    "Enumeration": "Enumeration",
+    "Boolean": "Boolean",
 }
 
 
@@ -56,6 +87,8 @@ class Flavour:
     """The capabilities in model exchange; none where there is no such interface."""
     sources: tuple[str, ...] = ()
     """Files of sources/ to compile."""
+    fmi: Literal[2, 3] = 2
+    """The version of the standard."""
 
 
 PYTHON = Flavour(
@@ -84,19 +117,27 @@ NATIVE = Flavour(
     ),
     exchange=MappingProxyType({**COMMON_CAPABILITIES, **NATIVE_CAPABILITIES}),
     categories=MappingProxyType(LOG_CATEGORIES),
-    sources=(
-        "exchange.c",
-        "fmi2.c",
-        "instance.c",
-        "kernel.c",
-        "linearization.c",
-        "logarithm.c",
-        "memory.c",
-        "partials.c",
-        "serialize.c",
-        "text.c",
-        "trig.c",
+    sources=("fmi2.c", *SOURCES),
+)
+NATIVE3 = Flavour(
+    model=HOVERCRAFT,
+    identifier=f"{MODEL_NAME}Native3",
+    tool="zig cc",
+    capabilities=MappingProxyType(
+        {
+            "canHandleVariableCommunicationStepSize": "true",
+            "maxOutputDerivativeOrder": "1",
+            "providesIntermediateUpdate": "false",
+            "mightReturnEarlyFromDoStep": "false",
+            "canReturnEarlyAfterIntermediateUpdate": "false",
+            "hasEventMode": "false",
+            **CAPABILITIES_3,
+        }
     ),
+    exchange=MappingProxyType({"needsCompletedIntegratorStep": "true", **CAPABILITIES_3}),
+    categories=MappingProxyType(LOG_CATEGORIES),
+    sources=("fmi3.c", *SOURCES),
+    fmi=3,
 )
 
 
@@ -106,9 +147,9 @@ def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
     root = Element(
         "fmiModelDescription",
         {
-            "fmiVersion": "2.0",
+            "fmiVersion": f"{flavour.fmi}.0",
             "modelName": model.name,
-            "guid": guid(build),
+            "guid" if flavour.fmi == 2 else "instantiationToken": guid(build),
             "description": model.description,
             "author": AUTHOR,
             "version": __version__,
@@ -117,14 +158,14 @@ def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
             "generationTool": f"hovercraft-fmu {__version__} with {flavour.tool}",
             "generationDateAndTime": RELEASE_DATE,
             "variableNamingConvention": "structured",
-            **({"numberOfEventIndicators": "0"} if flavour.exchange else {}),
+            **({"numberOfEventIndicators": "0"} if flavour.exchange and flavour.fmi == 2 else {}),
         },
     )
     if flavour.exchange:
         _interface(root, "ModelExchange", flavour, flavour.exchange)
     _interface(root, "CoSimulation", flavour, flavour.capabilities)
     _units(SubElement(root, "UnitDefinitions"), model)
-    _types(SubElement(root, "TypeDefinitions"), model)
+    _types(SubElement(root, "TypeDefinitions"), flavour)
     categories = SubElement(root, "LogCategories")
     for name, text in flavour.categories.items():
         SubElement(categories, "Category", {"name": name, "description": text})
@@ -138,9 +179,9 @@ def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
         },
     )
     variables = SubElement(root, "ModelVariables")
-    for variable in model.variables:
-        _variable(variables, variable, model)
-    _structure(SubElement(root, "ModelStructure"), model, bool(flavour.exchange))
+    for variable in model.variables if flavour.fmi == 2 else (TIME, *model.variables):
+        _variable(variables, variable, flavour)
+    _structure(SubElement(root, "ModelStructure"), flavour)
     return root
 
 
@@ -151,7 +192,7 @@ def guid(build: str) -> str:
 
 def _interface(parent: Element, name: str, flavour: Flavour, capabilities: Mapping[str, str]) -> None:
     node = SubElement(parent, name, {"modelIdentifier": flavour.identifier, **capabilities})
-    if flavour.sources:
+    if flavour.sources and flavour.fmi == 2:  # FMI 3.0 has them in sources/buildDescription.xml
         files = SubElement(node, "SourceFiles")
         for name in flavour.sources:
             SubElement(files, "File", {"name": name})
@@ -166,20 +207,30 @@ def _units(parent: Element, model: Model) -> None:
             SubElement(node, "DisplayUnit", {"name": display, "factor": repr(factor)})
 
 
-def _types(parent: Element, model: Model) -> None:
-    for name, unit in model.units.items():
-        node = SubElement(parent, "SimpleType", {"name": unit.type_name, "description": f"{unit.quantity} in {name}"})
-        real = SubElement(node, "Real", {"quantity": unit.quantity, "unit": name})
+def _types(parent: Element, flavour: Flavour) -> None:
+    for name, unit in flavour.model.units.items():
+        attributes = {"name": unit.type_name, "description": f"{unit.quantity} in {name}"}
+        real = _typed(parent, "SimpleType", "Real", attributes, flavour.fmi)
+        real.set("quantity", unit.quantity)
+        real.set("unit", name)
         if unit.display:
             real.set("displayUnit", unit.display[0])
-    for each in model.enumerations:
-        node = SubElement(parent, "SimpleType", {"name": each.type_name, "description": each.description})
-        items = SubElement(node, "Enumeration", {"quantity": each.type_name})
+    for each in flavour.model.enumerations:
+        attributes = {"name": each.type_name, "description": each.description}
+        items = _typed(parent, "SimpleType", "Enumeration", attributes, flavour.fmi)
+        items.set("quantity", each.type_name)
         for number, (name, text) in enumerate(each.items, 1):
             SubElement(items, "Item", {"name": name, "value": str(number), "description": text})
 
 
-def _variable(parent: Element, variable: Variable, model: Model) -> None:
+def _typed(parent: Element, tag: str, kind: Kind, attributes: dict[str, str], fmi: int) -> Element:
+    """The element for what a type defines: FMI 2.0 nests it, FMI 3.0 names the outer one after the type."""
+    if fmi == 2:
+        return SubElement(SubElement(parent, tag, attributes), kind)
+    return SubElement(parent, FMI_3_TYPES[kind] + ("Type" if tag == "SimpleType" else ""), attributes)
+
+
+def _variable(parent: Element, variable: Variable, flavour: Flavour) -> None:
     attributes = {
         "name": variable.name,
         "valueReference": str(variable.reference),
@@ -189,15 +240,11 @@ def _variable(parent: Element, variable: Variable, model: Model) -> None:
     }
     if variable.initial:
         attributes["initial"] = variable.initial
-    _typed(SubElement(parent, "ScalarVariable", attributes), variable, model)
-
-
-def _typed(parent: Element, variable: Variable, model: Model) -> None:
-    node = SubElement(parent, variable.kind)
+    node = _typed(parent, "ScalarVariable", variable.kind, attributes, flavour.fmi)
     if variable.enumeration:
         node.set("declaredType", variable.enumeration.type_name)
     if variable.unit:
-        unit = model.units[variable.unit]
+        unit = flavour.model.units[variable.unit]
         node.set("declaredType", unit.type_name)
         node.set("quantity", unit.quantity)
         node.set("unit", variable.unit)
@@ -208,28 +255,13 @@ def _typed(parent: Element, variable: Variable, model: Model) -> None:
         if value is not None:
             node.set(name, repr(value))  # repr: the shortest text that gives the same bits
     if variable.derivative_of:
-        node.set("derivative", str(model.index[variable.derivative_of]))
+        node.set("derivative", _place(variable.derivative_of, flavour))
 
 
-def _structure(parent: Element, model: Model, exchange: bool) -> None:
-    # In co-simulation an output belongs to a communication point: it never follows the inputs of that point, so there
-    # are no dependencies. Without saying so, masters see algebraic loops that are not there. In model exchange it
-    # follows the states, and no inputs either.
-    outputs = SubElement(parent, "Outputs")
-    for variable in model.variables:
-        if variable.causality == "output":
-            names = (variable.name,) if variable.name in STATES else variable.depends_on
-            _unknown(outputs, model, variable.name, names if exchange else ())
-    if exchange:
-        derivatives = SubElement(parent, "Derivatives")
-        for name in DERIVATIVES:
-            _unknown(derivatives, model, name, (name,) if name in STATES else _followed(name))
-    unknowns = SubElement(parent, "InitialUnknowns")
-    for variable in model.variables:
-        if variable.initial == "calculated" and variable.causality in ("output", "calculatedParameter"):
-            _unknown(unknowns, model, variable.name, variable.depends_on)
-        elif exchange and variable.initial == "calculated" and variable.name in DERIVATIVES:
-            _unknown(unknowns, model, variable.name, _followed(variable.name) + CRAFT_PARAMETERS)
+def _place(name: str, flavour: Flavour) -> str:
+    """How one variable refers to another."""
+    model = flavour.model
+    return str(model.index[name] if flavour.fmi == 2 else model.by_name[name].reference)
 
 
 def _followed(acceleration: str) -> tuple[str, ...]:
@@ -238,6 +270,38 @@ def _followed(acceleration: str) -> tuple[str, ...]:
     return (*inputs, "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
 
 
-def _unknown(parent: Element, model: Model, name: str, dependencies: tuple[str, ...]) -> None:
-    indices = sorted(model.index[each] for each in dependencies)
-    SubElement(parent, "Unknown", {"index": str(model.index[name]), "dependencies": " ".join(map(str, indices))})
+def _structure(parent: Element, flavour: Flavour) -> None:
+    # In co-simulation an output belongs to a communication point: it never follows the inputs of that point, so there
+    # are no dependencies. Without saying so, masters see algebraic loops that are not there. In model exchange it
+    # follows the states, and no inputs either.
+    table = flavour.model.variables
+    outputs = {v.name: (v.name,) if v.name in STATES else v.depends_on for v in table if v.causality == "output"}
+    initial = {
+        v.name: v.depends_on
+        for v in table
+        if v.initial == "calculated" and v.causality in ("output", "calculatedParameter")
+    }
+    derivatives = {name: (name,) if name in STATES else _followed(name) for name in DERIVATIVES}
+    if not flavour.exchange:
+        outputs, derivatives = dict.fromkeys(outputs, ()), {}
+    calculated = {v.name for v in table if v.initial == "calculated"}
+    initial |= {name: others + CRAFT_PARAMETERS for name, others in derivatives.items() if name in calculated}
+    _unknowns(parent, "Output", outputs, flavour)
+    _unknowns(parent, "Derivative" if flavour.fmi == 2 else "ContinuousStateDerivative", derivatives, flavour)
+    _unknowns(parent, "InitialUnknown", initial, flavour)
+
+
+def _unknowns(parent: Element, role: str, dependencies: Mapping[str, tuple[str, ...]], flavour: Flavour) -> None:
+    """FMI 2.0 has a list for each role, FMI 3.0 elements of that name."""
+    if not dependencies:
+        return
+    if flavour.fmi == 2:
+        parent, tag, key = SubElement(parent, f"{role}s"), "Unknown", "index"
+    else:
+        tag, key = role, "valueReference"
+    for name, others in dependencies.items():
+        ordered = sorted(others, key=lambda other: int(_place(other, flavour)))
+        places = " ".join(_place(other, flavour) for other in ordered)
+        node = SubElement(parent, tag, {key: _place(name, flavour), "dependencies": places})
+        if flavour.fmi == 3:  # a state is its own output, and a velocity the derivative of a position: the factor is 1
+            node.set("dependenciesKind", " ".join("constant" if other == name else "dependent" for other in ordered))

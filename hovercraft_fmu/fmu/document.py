@@ -2,6 +2,7 @@
 
 import csv
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 
 import jinja2
@@ -9,21 +10,31 @@ import jinja2
 from .._version import __version__
 from ..model.craft import DRAG_AREAS, PRESETS
 from ..model.integrators import INTEGRATORS
-from .description import DESCRIPTION
+from .description import DESCRIPTION, FMI_3_TYPES, NATIVE, NATIVE3, PYTHON, Flavour
 from .interface import VARIABLES, WARNINGS, Variable
 
 FOLDER = Path(__file__).parent / "documentation"
 RESULTS = FOLDER / "results"
 """What `hovercraft-fmu trade` and `hovercraft-fmu stability` wrote, with `--output` there."""
 
+CHECKED: Mapping[str, str] = {
+    PYTHON.identifier: "checked.md",
+    NATIVE.identifier: "checked_native.md",
+    NATIVE3.identifier: "checked_native3.md",
+}
+"""What `hovercraft-fmu validate --table` printed for each FMU."""
 
-def pages(native: bool = False) -> dict[str, str]:
-    """Path inside the documentation -> the whole page, for the Python FMU or the native one."""
+
+def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
+    """Path inside the documentation -> the whole page, for one of the FMUs."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
     values = {
-        "native": native,
+        "native": bool(flavour.sources),
+        "flavour": flavour,
+        "fmi": flavour.fmi,
+        "types": FMI_3_TYPES if flavour.fmi == 3 else {kind: kind for kind in FMI_3_TYPES},
         "version": __version__,
         "description": DESCRIPTION,
         "variables": VARIABLES,
@@ -32,7 +43,7 @@ def pages(native: bool = False) -> dict[str, str]:
         "integrators": INTEGRATORS,
         "presets": PRESETS,
         "drag_areas": DRAG_AREAS,
-        "checked": _checked(FOLDER / ("checked_native.md" if native else "checked.md")),
+        "checked": _checked(FOLDER / CHECKED[flavour.identifier]),
         "measured": _all_measured(),
         "machine": _machine(),
     }

@@ -12,7 +12,7 @@ from ..model.dynamics import Controls, State, actuation, body_velocity, loads
 from ..model.integrators import INTEGRATORS
 
 Kind: TypeAlias = Literal["Real", "Integer", "Enumeration", "Boolean"]
-Causality: TypeAlias = Literal["input", "output", "local", "parameter", "calculatedParameter"]
+Causality: TypeAlias = Literal["input", "output", "local", "parameter", "calculatedParameter", "independent"]
 Variability: TypeAlias = Literal["continuous", "discrete", "fixed", "tunable"]
 
 SUBSTEPS_MAX = 2147483647
@@ -111,8 +111,8 @@ class Variable:
 
     @property
     def initial(self) -> str | None:
-        """FMI's `initial`: exact where a start is given, else calculated; none for an input."""
-        if self.causality == "input":
+        """FMI's `initial`: exact where a start is given, else calculated; none for an input and for the time."""
+        if self.causality in ("input", "independent"):
             return None
         return "calculated" if self.start is None else "exact"
 
@@ -281,6 +281,9 @@ VARIABLES: tuple[Variable, ...] = (
              "Share of the moment of the air on the rotating box about its own centre; 0 is off",
              minimum=0.0, maximum=1.0),
 )  # fmt: skip
+
+TIME = Variable(1000, "time", "independent", "continuous", "s", None, "Simulation time")
+"""FMI 3.0 wants it among the variables. Its value reference is none of the table's, which grow by one."""
 
 BY_NAME: Mapping[str, Variable] = MappingProxyType({variable.name: variable for variable in VARIABLES})
 INDEX: Mapping[str, int] = MappingProxyType({variable.name: i for i, variable in enumerate(VARIABLES, 1)})

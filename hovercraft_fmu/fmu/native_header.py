@@ -22,6 +22,7 @@ from .interface import (
     STEP_TURNS,
     STEP_UNSTABLE,
     SUBSTEPS_MAX,
+    TIME,
     VARIABLES,
     WARNINGS,
     WATCHED,
@@ -50,6 +51,7 @@ enum {{
 {references}
     VARIABLE_COUNT
 }};
+enum {{ V_TIME = {time} }}; /* of FMI 3.0 alone; not in `reals` */
 
 enum {{ {counts} }};
 enum {{ SUBSTEPS_MAX = {substeps_max} }};
@@ -145,6 +147,7 @@ def variables_header(build: str) -> str:
         build=build,
         guid=guid(build),
         references="\n".join(f"    {constant(v.name)} = {v.reference}," for v in VARIABLES),
+        time=TIME.reference,
         counts=_assigned(counts),
         substeps_max=SUBSTEPS_MAX,
         warnings=_assigned(warnings),

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import fmpy
 
-from .description import NATIVE, model_description
+from .description import NATIVE, Flavour, model_description
 from .extras import build_description, terminals_and_icons, xml
 from .icon import icon_png
 from .mach_o import universal
@@ -21,11 +21,11 @@ from .native_header import variables_header
 from .package import digest, documents, write_fmu, zipped
 
 C_FOLDER = Path(__file__).parent / "native"
-FMI_HEADERS = tuple(
-    Path(fmpy.__file__).parent / "c-code" / name
-    for name in ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
-)
-"""The standard's, with their licence in them, as fmpy has them: it took the prefix of names out."""
+FMI_HEADERS = {
+    2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
+"""The standards', with their licence in them, as fmpy has them: it took the prefix of names out of FMI 2.0's."""
 NO_PREFIX = "#define fmi2FullName(name) name\n"
 PREFIX = """\
 #if defined(FMI2_FUNCTION_PREFIX) && !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
@@ -53,7 +53,6 @@ class Platform:
 
 
 # glibc of 2012; macOS of 2020. Symbols of a Mach-O file stay: what strips them would break its signature.
-MAC = (f"-Wl,-install_name,@rpath/{NATIVE.identifier}.dylib",)
 PLATFORMS: Mapping[str, Platform] = {
     "x86_64-linux": Platform("x86_64-linux-gnu.2.17", ".so"),
     "aarch64-linux": Platform("aarch64-linux-gnu.2.17", ".so"),
@@ -63,9 +62,10 @@ PLATFORMS: Mapping[str, Platform] = {
         ".dll",
         ("-s", "-nostdlib", "-Wl,--entry=DllMain", "-DHOVERCRAFT_NO_LIBC", "-lkernel32"),
     ),
-    "x86_64-darwin": Platform("x86_64-macos.11.0", ".dylib", MAC),
-    "aarch64-darwin": Platform("aarch64-macos.11.0", ".dylib", MAC),
+    "x86_64-darwin": Platform("x86_64-macos.11.0", ".dylib", ()),
+    "aarch64-darwin": Platform("aarch64-macos.11.0", ".dylib", ()),
 }
+FMI_2_FOLDERS = {"x86_64-linux": "linux64", "x86_64-windows": "win64", "x86_64-darwin": "darwin64"}
 
 
 def has_compiler() -> bool:
@@ -73,8 +73,12 @@ def has_compiler() -> bool:
     return importlib.util.find_spec("ziglang") is not None
 
 
-def build_native_fmu(path: str | os.PathLike[str] = f"build/{NATIVE.identifier}.fmu") -> Path:
-    """Write the native FMU to `path` (its folder is made) and return the path.
+def build_native_fmu(path: str | os.PathLike[str] | None = None, flavour: Flavour = NATIVE) -> Path:
+    """Write the native FMU of a flavour to `path` (its folder is made) and return the path.
+
+    Args:
+        path: the file; without it build/HovercraftNative.fmu or build/HovercraftNative3.fmu.
+        flavour: NATIVE or NATIVE3: FMI 2.0 or FMI 3.0.
 
     Raises:
         ModuleNotFoundError: no compiler.
@@ -83,35 +87,39 @@ def build_native_fmu(path: str | os.PathLike[str] = f"build/{NATIVE.identifier}.
     """
     if not has_compiler():
         raise ModuleNotFoundError("the native FMU needs a C compiler: pip install 'hovercraft-fmu[native]'")
-    return write_fmu(path, _archive)
+    return write_fmu(path or f"build/{flavour.identifier}.fmu", lambda: _archive(flavour))
 
 
-def sources(build: str) -> dict[str, bytes]:
+def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
     """All that a C compiler needs, by name; `build` is a hexadecimal digest of 32 digits."""
-    files = {file.name: file.read_bytes() for file in (*sorted(C_FOLDER.glob("*.[ch]")), *FMI_HEADERS)}
-    functions = files["fmi2Functions.h"].replace(NO_PREFIX.encode(), PREFIX.encode())
-    return {**files, "fmi2Functions.h": functions, "variables.h": variables_header(build).encode()}
+    ours = [C_FOLDER / name for name in flavour.sources] + sorted(C_FOLDER.glob("*.h"))
+    headers = [Path(fmpy.__file__).parent / "c-code" / name for name in FMI_HEADERS[flavour.fmi]]
+    files = {file.name: file.read_bytes() for file in (*ours, *headers)}
+    if flavour.fmi == 2:
+        files["fmi2Functions.h"] = files["fmi2Functions.h"].replace(NO_PREFIX.encode(), PREFIX.encode())
+    return {**files, "variables.h": variables_header(build).encode()}
 
 
-def _archive() -> bytes:
+def _archive(flavour: Flavour) -> bytes:
     files = {
-        **{f"documentation/{name}": content for name, content in documents(native=True).items()},
+        **{f"documentation/{name}": content for name, content in documents(flavour).items()},
         "documentation/licenses/fdlibm.txt": _sun_notice(),
-        "sources/buildDescription.xml": xml(build_description(NATIVE, OPTIONS)),
+        "sources/buildDescription.xml": xml(build_description(flavour, OPTIONS)),
         "terminalsAndIcons/icon.png": icon_png(),
         "terminalsAndIcons/terminalsAndIcons.xml": xml(terminals_and_icons()),
-        "model.png": icon_png(),
     }
+    if flavour.fmi == 2:
+        files["model.png"] = icon_png()
     made_by = {"compiler": f"{metadata.version('ziglang')} {OPTIONS} {LIBRARY} {PLATFORMS}".encode()}
-    description = {"modelDescription.xml": xml(model_description("0" * 32, NATIVE))}
-    build = digest({**files, **sources("0" * 32), **description, **made_by})
-    c_files = sources(build)
+    description = {"modelDescription.xml": xml(model_description("0" * 32, flavour))}
+    build = digest({**files, **sources("0" * 32, flavour), **description, **made_by})
+    c_files = sources(build, flavour)
     return zipped(
         {
             **files,
             **{f"sources/{name}": content for name, content in c_files.items()},
-            "modelDescription.xml": xml(model_description(build, NATIVE)),
-            **_binaries(c_files),
+            "modelDescription.xml": xml(model_description(build, flavour)),
+            **_binaries(c_files, flavour),
         }
     )
 
@@ -123,26 +131,30 @@ def _sun_notice() -> bytes:
     return "".join(line.removeprefix("   ") + "\n" for line in lines).encode()
 
 
-def _binaries(c_files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """FMI 2.0's own folders, and FMI 3.0's for the platforms that FMI 2.0 has none for."""
+def _binaries(c_files: Mapping[str, bytes], flavour: Flavour) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory(prefix="hovercraft_native_") as folder:
         for name, content in c_files.items():
             (Path(folder) / name).write_bytes(content)
-        built = {name: compiled(Path(folder), platform) for name, platform in PLATFORMS.items()}
-    folders = {
-        "linux64/{}.so": built["x86_64-linux"],
-        "win64/{}.dll": built["x86_64-windows"],
-        "darwin64/{}.dylib": universal((built["x86_64-darwin"], built["aarch64-darwin"])),
-        "aarch64-linux/{}.so": built["aarch64-linux"],
-        "aarch64-darwin/{}.dylib": built["aarch64-darwin"],
-    }
-    return {f"binaries/{name.format(NATIVE.identifier)}": content for name, content in folders.items()}
+        built = {name: compiled(Path(folder), platform, flavour) for name, platform in PLATFORMS.items()}
+    files = {library(name, flavour): content for name, content in built.items()}
+    if flavour.fmi == 2:
+        both = (built["x86_64-darwin"], built["aarch64-darwin"])
+        files[library("x86_64-darwin", flavour)] = universal(both)
+    return {f"binaries/{name}": content for name, content in files.items()}
 
 
-def compiled(folder: Path, platform: Platform) -> bytes:
+def library(name: str, flavour: Flavour) -> str:
+    """Where in binaries/ the library for a platform is: FMI 2.0 has folders of its own for three of them."""
+    folder = FMI_2_FOLDERS.get(name, name) if flavour.fmi == 2 else name
+    return f"{folder}/{flavour.identifier}{PLATFORMS[name].suffix}"
+
+
+def compiled(folder: Path, platform: Platform, flavour: Flavour = NATIVE) -> bytes:
     """The library of the sources in `folder`. Raises OSError with what the compiler said."""
-    output = f"{NATIVE.identifier}{platform.suffix}"
-    command = [*compiler(platform), *LIBRARY, *NATIVE.sources, *platform.options, "-o", output]
+    output = f"{flavour.identifier}{platform.suffix}"
+    command = [*compiler(platform), *LIBRARY, *flavour.sources, *platform.options, "-o", output]
+    if platform.suffix == ".dylib":
+        command.append(f"-Wl,-install_name,@rpath/{output}")
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise OSError(f"compiling for {platform.target} failed: {done.stderr.strip()}")

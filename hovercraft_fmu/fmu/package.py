@@ -125,17 +125,19 @@ def _traveling(content: Content) -> list[Path]:
     return sorted(path for pattern in (*SHARED, *content.travels) for path in PACKAGE.glob(pattern))
 
 
-def documents(native: bool) -> dict[str, bytes]:
-    """What both flavours have in documentation/, by path."""
+def documents(flavour: Flavour) -> dict[str, bytes]:
+    """What every flavour has in documentation/, by path."""
     static = {
         path.relative_to(STATIC).as_posix(): path.read_bytes()
         for path in sorted(STATIC.rglob("*"))
-        if path.is_file() and path.suffix != ".jinja" and not (native and path.name == "externalDependencies.txt")
+        if path.is_file()
+        and path.suffix != ".jinja"
+        and not (flavour.sources and path.name == "externalDependencies.txt")
     }
-    return {**static, **{name: page.encode() for name, page in pages(native).items()}}
+    return {**static, **{name: page.encode() for name, page in pages(flavour).items()}}
 
 
-HOVERCRAFT_CONTENT = Content(PYTHON, "fmu.slave", "HovercraftSlave", ("fmu/slave.py",), lambda: documents(native=False))
+HOVERCRAFT_CONTENT = Content(PYTHON, "fmu.slave", "HovercraftSlave", ("fmu/slave.py",), lambda: documents(PYTHON))
 
 
 def _pythonfmu_license() -> bytes:

@@ -93,10 +93,14 @@ HOSTS: Mapping[str, Host] = {
 }  # fmt: skip
 NATIVE_HOSTS: Mapping[str, Host] = {**HOSTS, "C host": Host("C host", lambda: "no Python", _missing_to_compile)}
 """The same for a native FMU, which needs no Python beside it."""
+FMI_3_HOSTS: Mapping[str, Host] = {name: host for name, host in NATIVE_HOSTS.items() if name != "libcosimpy"}
+"""Those that know FMI 3.0: libcosimpy 0.0.6 dies of it without a word."""
 
 
 def hosts_of(fmu: Path) -> Mapping[str, Host]:
     """The hosts for the flavour of an FMU."""
+    if fmpy.read_model_description(fmu, validate=False).fmiVersion == "3.0":
+        return FMI_3_HOSTS
     with zipfile.ZipFile(fmu) as archive:
         return HOSTS if PYTHON_MODULE in archive.namelist() else NATIVE_HOSTS
 
@@ -120,17 +124,27 @@ def run_in(host: str, fmu: Path) -> list[list[float]]:
 
 def run_fmpy(fmu: Path) -> list[list[float]]:
     """Through fmpy's low-level interface."""
+    return _driven(fmu, {variable.name: variable.reference for variable in VARIABLES})
+
+
+def _driven(fmu: Path, references: Mapping[str, int]) -> list[list[float]]:
     from ..simulation import instantiated, read_description
 
-    with instantiated(fmu, read_description(fmu), []) as (_, instance):
-        instance.setupExperiment()
+    description = read_description(fmu)
+    inputs, outputs = ([references[name] for name in names] for names in (INPUTS, OUTPUTS))
+    with instantiated(fmu, description, []) as (_, instance):
+        if description.fmiVersion == "2.0":
+            instance.setupExperiment()
+            put, get = instance.setReal, instance.getReal
+        else:
+            put, get = instance.setFloat64, instance.getFloat64
         instance.enterInitializationMode()
         instance.exitInitializationMode()
         rows = []
         for k, controls in enumerate(CONTROLS):
-            instance.setReal(INPUT_REFERENCES, controls)
+            put(inputs, controls)
             instance.doStep(k * COMMUNICATION_STEP, COMMUNICATION_STEP)
-            rows.append(list(instance.getReal(OUTPUT_REFERENCES)))
+            rows.append(list(get(outputs)))
         return rows
 
 
@@ -179,37 +193,28 @@ def run_ecospy(fmu: Path) -> list[list[float]]:
 
 def run_fmucontainer(fmu: Path) -> list[list[float]]:
     """The FMU inside a container FMU, which fmpy drives."""
-    from ..simulation import instantiated, read_description
-
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         shutil.copy(fmu, work / "Hovercraft.fmu")
         content = {"name": "Container.fmu", "fmu": ["Hovercraft.fmu"], "step_size": COMMUNICATION_STEP}
         (work / "container.json").write_text(json.dumps(content))
+        version = fmpy.read_model_description(fmu).fmiVersion[0]
         code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
-        command = [sys.executable, "-c", code, "-container", "container.json", "-fmu-directory", "."]
+        command = [sys.executable, "-c", code, "-container", "container.json", "-fmu-directory", ".", "-fmi", version]
         subprocess.run(command, cwd=work, check=True, stdout=subprocess.DEVNULL)
-        description = read_description(work / "Container.fmu")
-        references = {variable.name: variable.valueReference for variable in description.modelVariables}
-        with instantiated(work / "Container.fmu", description, []) as (_, instance):
-            instance.setupExperiment()
-            instance.enterInitializationMode()
-            instance.exitInitializationMode()
-            rows = []
-            for k, controls in enumerate(CONTROLS):
-                instance.setReal([references[name] for name in INPUTS], controls)
-                instance.doStep(k * COMMUNICATION_STEP, COMMUNICATION_STEP)
-                rows.append(list(instance.getReal([references[name] for name in OUTPUTS])))
-            return rows
+        container = fmpy.read_model_description(work / "Container.fmu")
+        return _driven(work / "Container.fmu", {v.name: v.valueReference for v in container.modelVariables})
 
 
 def run_c(fmu: Path) -> list[list[float]]:
     """A host in C, compiled here; for a Python FMU Python's library is preloaded, as a tool that is not Python must."""
     description = fmpy.read_model_description(fmu)
+    fmi = int(description.fmiVersion[0])
     with tempfile.TemporaryDirectory() as folder:
         fmpy.extract(fmu, unzipdir=folder)
-        library = Path(folder, "binaries", "linux64", f"{description.coSimulation.modelIdentifier}.so")
-        host = compile_host(Path(folder) / "host")
+        platform = "linux64" if fmi == 2 else "x86_64-linux"
+        library = Path(folder, "binaries", platform, f"{description.coSimulation.modelIdentifier}.so")
+        host = compile_host(Path(folder) / "host", fmi)
         command = [str(host), str(library), description.guid, Path(folder, "resources").as_uri(),
                    repr(COMMUNICATION_STEP), ",".join(map(str, INPUT_REFERENCES)),
                    ",".join(map(str, OUTPUT_REFERENCES))]  # fmt: skip
@@ -223,11 +228,11 @@ def run_c(fmu: Path) -> list[list[float]]:
     return [[float(text) for text in line.split()] for line in done.stdout.splitlines()]
 
 
-def compile_host(program: Path) -> Path:
-    """Compile host.c with the machine's compiler, warnings as errors."""
+def compile_host(program: Path, fmi: int) -> Path:
+    """Compile host.c for a version of FMI with the machine's compiler, warnings as errors."""
     headers, source = Path(fmpy.__file__).parent / "c-code", Path(__file__).parent / "host.c"
-    command = [compiler() or "cc", "-std=gnu11", "-Wall", "-Wextra", "-Werror", "-isystem", str(headers), str(source),
-               "-o", str(program), "-ldl"]  # fmt: skip
+    command = [compiler() or "cc", "-std=gnu11", "-Wall", "-Wextra", "-Werror", f"-DFMI={fmi}", "-isystem",
+               str(headers), str(source), "-o", str(program), "-ldl"]  # fmt: skip
     subprocess.run(command, check=True)
     return program
 

@@ -11,13 +11,8 @@
 struct component {
     struct instance instance;
     fmi2CallbackFunctions callbacks;
-    bool warnings, errors; /* the categories that are logged */
     char name[];
 };
-
-static const char *const WARNING_CATEGORY = "logStatusWarning";
-static const char *const ERROR_CATEGORY = "logStatusError";
-static const char *const ALL_CATEGORIES = "logAll";
 
 static fmi2Status status_of(enum verdict verdict)
 {
@@ -25,13 +20,11 @@ static fmi2Status status_of(enum verdict verdict)
 }
 
 /* A message is its own format: it never contains a '%'. */
-static void tell(void *sink, enum verdict verdict, const char *message)
+static void tell(void *sink, enum verdict verdict, const char *category, const char *message)
 {
-    struct component *c = sink;
-    const bool wanted = verdict == WARNED ? c->warnings : c->errors;
-    if (wanted && c->callbacks.logger)
-        c->callbacks.logger(c->callbacks.componentEnvironment, c->name, status_of(verdict),
-                            verdict == WARNED ? WARNING_CATEGORY : ERROR_CATEGORY, message);
+    const struct component *c = sink;
+    if (c->callbacks.logger)
+        c->callbacks.logger(c->callbacks.componentEnvironment, c->name, status_of(verdict), category, message);
 }
 
 static void *allocate(const fmi2CallbackFunctions *callbacks, size_t size)
@@ -70,28 +63,10 @@ const char *fmi2GetVersion(void)
     return fmi2Version;
 }
 
-/* Switched on, only these categories are told; switched off, these no more. Without categories it is all of them. */
 fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean on, size_t n, const fmi2String categories[])
 {
     struct component *c = component;
-    bool warnings = n == 0, errors = n == 0;
-    if (!c)
-        return fmi2Error;
-    for (size_t i = 0; i < n; i++) {
-        if (!categories || !categories[i])
-            return refuse_null(c, "fmi2SetDebugLogging");
-        const bool all = strcmp(categories[i], ALL_CATEGORIES) == 0;
-        const bool warning = strcmp(categories[i], WARNING_CATEGORY) == 0;
-        const bool error = strcmp(categories[i], ERROR_CATEGORY) == 0;
-        if (!all && !warning && !error)
-            return status_of(instance_say(&c->instance, REFUSED, "log category '%q': must be one of %s, %s, %s",
-                                          categories[i], WARNING_CATEGORY, ERROR_CATEGORY, ALL_CATEGORIES));
-        warnings = warnings || all || warning;
-        errors = errors || all || error;
-    }
-    c->warnings = on ? warnings : c->warnings && !warnings;
-    c->errors = on ? errors : c->errors && !errors;
-    return fmi2OK;
+    return c ? status_of(instance_log(&c->instance, "fmi2SetDebugLogging", on != 0, n, categories)) : fmi2Error;
 }
 
 static bool is_acceptable(struct component *c, fmi2Type type, fmi2String guid)
@@ -107,7 +82,6 @@ static bool is_acceptable(struct component *c, fmi2Type type, fmi2String guid)
     return false;
 }
 
-/* Errors are told even where logging is off: an instance that fails without a word helps nobody. */
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
 {
@@ -119,11 +93,9 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     if (!c)
         return NULL;
     c->callbacks = *callbacks;
-    c->warnings = logging;
-    c->errors = true;
     memcpy(c->name, name ? name : "", length);
     c->name[length] = '\0';
-    instance_start(&c->instance, type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION, tell, c);
+    instance_start(&c->instance, type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION, tell, c, logging != 0);
     if (is_acceptable(c, type, guid))
         return c;
     release(callbacks, c);
@@ -309,11 +281,8 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fm
         return fmi2Error;
     if (!state || !bytes)
         return refuse_null(c, "fmi2SerializeFMUstate");
-    if (size < instance_serialized_size())
-        return status_of(instance_say(&c->instance, REFUSED, "fmi2SerializeFMUstate: size = %u: must be %u bytes",
-                                      (unsigned long long)size, (unsigned long long)instance_serialized_size()));
-    instance_serialize(state, (unsigned char *)bytes);
-    return fmi2OK;
+    return status_of(
+        instance_serialize(&c->instance, "fmi2SerializeFMUstate", state, (unsigned char *)bytes, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)

@@ -2,8 +2,13 @@
 
 #include <math.h>
 #include <stdarg.h>
+#include <string.h>
 
 #include "text.h"
+
+static const char WARNING_CATEGORY[] = "logStatusWarning";
+static const char ERROR_CATEGORY[] = "logStatusError";
+static const char ALL_CATEGORIES[] = "logAll";
 
 /* ---- what is said */
 
@@ -14,8 +19,30 @@ enum verdict instance_say(struct instance *instance, enum verdict verdict, const
     va_start(values, format);
     text_format(message, format, values);
     va_end(values);
-    instance->tell(instance->sink, verdict, message);
+    if (verdict == WARNED ? instance->warnings : instance->errors)
+        instance->tell(instance->sink, verdict, verdict == WARNED ? WARNING_CATEGORY : ERROR_CATEGORY, message);
     return verdict;
+}
+
+enum verdict instance_log(struct instance *instance, const char *call, bool on, size_t n,
+                          const char *const *categories)
+{
+    bool warnings = n == 0, errors = n == 0;
+    for (size_t i = 0; i < n; i++) {
+        if (!categories || !categories[i])
+            return instance_say(instance, REFUSED, "%s: no argument must be NULL", call);
+        const bool all = strcmp(categories[i], ALL_CATEGORIES) == 0;
+        const bool warning = strcmp(categories[i], WARNING_CATEGORY) == 0;
+        const bool error = strcmp(categories[i], ERROR_CATEGORY) == 0;
+        if (!all && !warning && !error)
+            return instance_say(instance, REFUSED, "log category '%q': must be one of %s, %s, %s", categories[i],
+                                WARNING_CATEGORY, ERROR_CATEGORY, ALL_CATEGORIES);
+        warnings = warnings || all || warning;
+        errors = errors || all || error;
+    }
+    instance->warnings = on ? warnings : instance->warnings && !warnings;
+    instance->errors = on ? errors : instance->errors && !errors;
+    return FINE;
 }
 
 enum verdict instance_require(struct instance *instance, const char *call, enum phase phase)
@@ -69,11 +96,13 @@ void instance_reset(struct instance *instance)
     }
 }
 
-void instance_start(struct instance *instance, enum use use, teller *tell, void *sink)
+void instance_start(struct instance *instance, enum use use, teller *tell, void *sink, bool logging)
 {
     instance->now.use = use;
     instance->tell = tell;
     instance->sink = sink;
+    instance->warnings = logging;
+    instance->errors = true;
     instance_reset(instance);
 }
 
@@ -532,23 +561,22 @@ static const char *broken_rule(enum rule rule, double value)
     return NULL;
 }
 
-static enum verdict check_settable(struct instance *instance, const struct variable *variable, bool integer,
-                                   double value)
+static bool is_settable(const struct instance *instance, const struct variable *variable)
 {
-    if (variable->settable >> instance->now.phase & 1u)
+    return variable->settable >> instance->now.phase & 1u;
+}
+
+static enum verdict check_settable(struct instance *instance, const struct variable *variable, double value)
+{
+    if (is_settable(instance, variable))
         return FINE;
-    const char *format = integer ? "%s = %i: must not be set in state '%s' (%s)"
-                                 : "%s = %r: must not be set in state '%s' (%s)";
-    if (integer)
-        return instance_say(instance, REFUSED, format, variable->name, (long long)value,
-                            PHASE_NAMES[instance->now.phase], variable->role);
-    return instance_say(instance, REFUSED, format, variable->name, value, PHASE_NAMES[instance->now.phase],
-                        variable->role);
+    return instance_say(instance, REFUSED, "%s = %r: must not be set in state '%s' (%s)", variable->name, value,
+                        PHASE_NAMES[instance->now.phase], variable->role);
 }
 
 static enum verdict check_real(struct instance *instance, const struct variable *variable, double value)
 {
-    if (check_settable(instance, variable, false, value) == REFUSED)
+    if (check_settable(instance, variable, value) == REFUSED)
         return REFUSED;
     if (!isfinite(value))
         return instance_say(instance, REFUSED, "%s = %r: must be a finite number", variable->name, value);
@@ -603,22 +631,41 @@ enum verdict instance_set_reals(struct instance *instance, const unsigned *refer
     return FINE;
 }
 
+/* What can be set are items of an enumeration, all of them small numbers. */
+static enum verdict check_integer(struct instance *instance, const struct variable *variable, int64_t value)
+{
+    if (!is_settable(instance, variable))
+        return instance_say(instance, REFUSED, "%s = %i: must not be set in state '%s' (%s)", variable->name,
+                            (long long)value, PHASE_NAMES[instance->now.phase], variable->role);
+    const char *why = broken_rule(variable->rule, (double)value);
+    return why ? instance_say(instance, REFUSED, "%s = %i: %s", variable->name, (long long)value, why) : FINE;
+}
+
 enum verdict instance_set_integers(struct instance *instance, const unsigned *references, size_t n, const int *values)
 {
     for (size_t i = 0; i < n; i++) {
         if (!is_integer(references[i]))
             return instance_no_such(instance, "Integer or Enumeration", references[i]);
-        const struct variable *variable = &VARIABLES[references[i]];
-        if (check_settable(instance, variable, true, values[i]) == REFUSED)
+        if (check_integer(instance, &VARIABLES[references[i]], values[i]) == REFUSED)
             return REFUSED;
-        const char *why = broken_rule(variable->rule, values[i]);
-        if (why)
-            return instance_say(instance, REFUSED, "%s = %i: %s", variable->name, (long long)values[i], why);
     }
     for (size_t i = 0; i < n; i++)
         instance->now.integers[references[i]] = values[i];
     if (n > 0)
         after_set(instance, true);
+    return FINE;
+}
+
+enum verdict instance_set_enumerations(struct instance *instance, const unsigned *references, size_t n,
+                                       const int64_t *values)
+{
+    for (size_t i = 0; i < n; i++)
+        if (check_integer(instance, &VARIABLES[references[i]], values[i]) == REFUSED)
+            return REFUSED;
+    for (size_t i = 0; i < n; i++) {
+        const int value = (int)values[i];
+        instance_set_integers(instance, &references[i], 1, &value);
+    }
     return FINE;
 }
 
@@ -640,7 +687,7 @@ enum verdict instance_set_rates(struct instance *instance, const unsigned *refer
             return instance_say(instance, REFUSED, "value reference %u: must be that of an input to have a derivative",
                                 (unsigned long long)references[i]);
         const struct variable *variable = &VARIABLES[references[i]];
-        if (check_settable(instance, variable, false, values[i]) == REFUSED ||
+        if (check_settable(instance, variable, values[i]) == REFUSED ||
             check_order(instance, references[i], orders[i]) == REFUSED)
             return REFUSED;
         if (!isfinite(values[i]))

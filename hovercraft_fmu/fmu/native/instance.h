@@ -1,5 +1,6 @@
 /* One craft behind an interface for co-simulation or model exchange: variables, life cycle, faults, warnings, state. It
-   knows no standard: a face (fmi2.c) translates. What it is given it checks, once; a refused call changes nothing. */
+   knows no standard: a face (fmi2.c, fmi3.c) translates. What it is given it checks, once; a refused call
+   changes nothing. */
 
 #ifndef HOVERCRAFT_INSTANCE_H
 #define HOVERCRAFT_INSTANCE_H
@@ -19,7 +20,7 @@ enum use { CO_SIMULATION, MODEL_EXCHANGE };
 struct instance;
 
 /* Where a message goes; `sink` is the face's. */
-typedef void teller(void *sink, enum verdict verdict, const char *message);
+typedef void teller(void *sink, enum verdict verdict, const char *category, const char *message);
 
 /* All that a call can change, and all that an FMU state is: no pointer in it. */
 struct content {
@@ -46,17 +47,22 @@ struct instance {
     struct content now;
     teller *tell;
     void *sink;
+    bool warnings, errors; /* the categories that are logged */
     enum verdict last_step;
 };
 
 /* What a serialized state takes. */
 size_t instance_serialized_size(void);
 
-void instance_start(struct instance *instance, enum use use, teller *tell, void *sink);
+/* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. */
+void instance_start(struct instance *instance, enum use use, teller *tell, void *sink, bool logging);
 void instance_reset(struct instance *instance);
 
 /* Say something, and return the verdict. For `format` see text.h. */
 enum verdict instance_say(struct instance *instance, enum verdict verdict, const char *format, ...);
+/* Switched on, only these categories are told; switched off, these no more. Without categories it is all of them. */
+enum verdict instance_log(struct instance *instance, const char *call, bool on, size_t n,
+                          const char *const *categories);
 /* Refused, unless the instance is in this phase. */
 enum verdict instance_require(struct instance *instance, const char *call, enum phase phase);
 enum verdict instance_require_either(struct instance *instance, const char *call, enum phase one, enum phase other);
@@ -102,6 +108,9 @@ enum verdict instance_get_reals(struct instance *instance, const unsigned *refer
 enum verdict instance_get_integers(struct instance *instance, const unsigned *references, size_t n, int *values);
 enum verdict instance_set_reals(struct instance *instance, const unsigned *references, size_t n, const double *values);
 enum verdict instance_set_integers(struct instance *instance, const unsigned *references, size_t n, const int *values);
+/* As 64-bit numbers. */
+enum verdict instance_set_enumerations(struct instance *instance, const unsigned *references, size_t n,
+                                       const int64_t *values);
 /* A reference of a type that has no variables. */
 enum verdict instance_no_such(struct instance *instance, const char *kind, unsigned reference);
 
@@ -118,8 +127,9 @@ enum verdict instance_warn_of_held_inputs(struct instance *instance, const struc
 
 /* Take up a content as a whole. Refused: one of another use. */
 enum verdict instance_restore(struct instance *instance, const struct content *content);
-/* `bytes` has instance_serialized_size() bytes. The same on every platform. */
-void instance_serialize(const struct content *content, unsigned char *bytes);
+/* The same on every platform. Refused: less than instance_serialized_size() bytes. */
+enum verdict instance_serialize(struct instance *instance, const char *call, const struct content *content,
+                                unsigned char *bytes, size_t size);
 /* Refused: not complete and unchanged, or of another build. */
 enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
                                   struct content *content);

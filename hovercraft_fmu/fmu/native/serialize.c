@@ -137,11 +137,15 @@ static uint64_t checksum(const unsigned char *bytes, size_t n)
     return sum;
 }
 
-void instance_serialize(const struct content *content, unsigned char *bytes)
+enum verdict instance_serialize(struct instance *instance, const char *call, const struct content *content,
+                                unsigned char *bytes, size_t size)
 {
     struct content copy = *content;
     struct cursor cursor = {WRITE, bytes, NULL, MAGIC_SIZE};
     int32_t version = VERSION;
+    if (size < instance_serialized_size())
+        return instance_say(instance, REFUSED, "%s: size = %u: must be %u bytes", call, (unsigned long long)size,
+                            (unsigned long long)instance_serialized_size());
     memcpy(bytes, MAGIC, MAGIC_SIZE);
     exchange_integer(&cursor, &version);
     memcpy(bytes + cursor.at, BUILD, BUILD_SIZE);
@@ -149,6 +153,7 @@ void instance_serialize(const struct content *content, unsigned char *bytes)
     exchange(&cursor, &copy);
     uint64_t sum = checksum(bytes, cursor.at);
     exchange_word(&cursor, &sum, SUM_SIZE);
+    return FINE;
 }
 
 static bool is_complete(const unsigned char *bytes, size_t size)
