@@ -38,7 +38,7 @@ class Check(NamedTuple):
 
 
 def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
-    """Run every check on an FMU, FMI 2.0 or 3.0: for co-simulation, and for model exchange too; one Check each, as it is done.
+    """Run every check on an FMU, FMI 2.0 or 3.0, as co-simulation and as model exchange; one Check each, as it is done.
 
     Raises:
         FileNotFoundError: no such file.

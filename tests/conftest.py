@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 from hovercraft_fmu import build_fmu
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.native_package import build_native_fmu, has_compiler
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -26,27 +27,55 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build_fmu(tmp_path_factory.mktemp("fmu") / "Hovercraft.fmu")
 
 
-@pytest.fixture(scope="session")
-def native_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The native FMU of this tree, or the one that NATIVE_FMU names (a sanitized one, for example)."""
-    if given := os.environ.get("NATIVE_FMU"):
+def _native(flavour: Flavour, variable: str, folder: Path) -> Path:
+    """A native FMU of this tree, or the one that an environment variable names (a sanitized one, for example)."""
+    if given := os.environ.get(variable):
         return Path(given)
     if not has_compiler():
         pytest.skip("no ziglang: pip install 'hovercraft-fmu[native]'")
-    return build_native_fmu(tmp_path_factory.mktemp("native") / "HovercraftNative.fmu")
+    return build_native_fmu(folder / f"{flavour.identifier}.fmu", flavour)
 
 
-@pytest.fixture(scope="session", params=["python", "native"])
+@pytest.fixture(scope="session")
+def native_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The native FMU, FMI 2.0."""
+    return _native(NATIVE, "NATIVE_FMU", tmp_path_factory.mktemp("native"))
+
+
+@pytest.fixture(scope="session")
+def native3_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The native FMU, FMI 3.0."""
+    return _native(NATIVE3, "NATIVE3_FMU", tmp_path_factory.mktemp("native3"))
+
+
+@pytest.fixture(scope="session", params=["python", "native", "native3"])
 def flavour(request: pytest.FixtureRequest) -> str:
-    """Both kinds of FMU, one after the other."""
+    """All kinds of FMU, one after the other."""
     return str(request.param)
 
 
 @pytest.fixture(scope="session")
 def each_fmu(flavour: str, request: pytest.FixtureRequest) -> Path:
     """The FMU of that kind."""
-    made: Path = request.getfixturevalue("native_fmu" if flavour == "native" else "fmu")
+    made: Path = request.getfixturevalue("fmu" if flavour == "python" else f"{flavour}_fmu")
     return made
+
+
+@pytest.fixture(scope="session", params=[2, 3])
+def standard(request: pytest.FixtureRequest) -> int:
+    """The version of FMI of `each_native_fmu`."""
+    return int(request.param)
+
+
+@pytest.fixture(scope="session")
+def each_native_fmu(standard: int, request: pytest.FixtureRequest) -> Path:
+    """The native FMU of FMI 2.0, then that of FMI 3.0."""
+    made: Path = request.getfixturevalue("native_fmu" if standard == 2 else "native3_fmu")
+    return made
+
+
+FMI_2 = pytest.mark.parametrize("standard", [2], indirect=True)
+"""For what FMI 3.0 has not got."""
 
 
 @pytest.fixture

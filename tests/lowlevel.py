@@ -1,11 +1,11 @@
-"""The FMU through fmpy's low-level interface."""
+"""The FMU through fmpy's low-level interface, that of FMI 2.0 for every FMU."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import fmpy
+from fmpy import fmi2, fmi3
 
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, VARIABLES
 from hovercraft_fmu.simulation import instantiated, read_description
@@ -46,18 +46,97 @@ def everything(instance: Any) -> dict[str, float]:
     return {variable.name: value for variable, value in zip((*REALS, *INTEGERS), values, strict=True)}
 
 
+FMI_3_NAMES = {
+    "setReal": "setFloat64",
+    "getReal": "getFloat64",
+    "getRealOutputDerivatives": "getOutputDerivatives",
+    "fmi2GetRealOutputDerivatives": "fmi3GetOutputDerivatives",
+    "newDiscreteStates": "updateDiscreteStates",
+    "getDerivatives": "getContinuousStateDerivatives",
+    "getFMUstate": "getFMUState",
+    "setFMUstate": "setFMUState",
+    "freeFMUstate": "freeFMUState",
+    "serializeFMUstate": "serializeFMUState",
+    "deSerializeFMUstate": "deserializeFMUState",
+    "fmi2GetFMUstate": "fmi3GetFMUState",
+    "fmi2FreeFMUstate": "fmi3FreeFMUState",
+    "fmi2SerializeFMUstate": "fmi3SerializeFMUState",
+}
+FMI_3_WORDS = {
+    "fmi2SetupExperiment": "fmi3EnterInitializationMode",
+    "FMUstate: ": "FMUState: ",
+    "fmi2": "fmi3",
+    "type Real": "type Float64",
+    "type Integer or Enumeration": "type Int32",
+}
+
+
+class Instance3:
+    """fmpy's instance of FMI 3.0 with the methods of its instance of FMI 2.0.
+
+    To set up an experiment is a part of entering the initialization there, so it is done then.
+    """
+
+    def __init__(self, made: Any) -> None:
+        self.made = made
+        self.is_set_up = False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.made, named(self, name))
+
+    def setupExperiment(self, **given: float | None) -> None:  # noqa: N802 - fmpy's name
+        self.made.enterInitializationMode(**given)
+        self.is_set_up = True
+
+    def enterInitializationMode(self) -> None:  # noqa: N802
+        if not self.is_set_up:
+            self.made.enterInitializationMode()
+        self.is_set_up = False
+
+    def reset(self) -> None:
+        self.made.reset()
+        self.is_set_up = False
+
+    def getInteger(self, references: Sequence[int]) -> list[int]:  # noqa: N802
+        return [self._of_its_type("get", each)([each])[0] for each in references]
+
+    def setInteger(self, references: Sequence[int], values: Sequence[int]) -> None:  # noqa: N802
+        for each, value in zip(references, values, strict=True):
+            self._of_its_type("set", each)([each], [value])
+
+    def _of_its_type(self, verb: str, reference: int) -> Any:
+        enumerations = {variable.reference for variable in VARIABLES if variable.enumeration}
+        return getattr(self.made, verb + ("Int64" if reference in enumerations else "Int32"))
+
+
+def named(instance: Any, function: str) -> str:
+    """A function of FMI 2.0 as the standard of an instance has it."""
+    return FMI_3_NAMES.get(function, function.replace("fmi2", "fmi3")) if isinstance(instance, Instance3) else function
+
+
+def worded(instance: Any, message: str) -> str:
+    """A message of an FMI 2.0 FMU as the standard of an instance has it."""
+    for old, new in FMI_3_WORDS.items() if isinstance(instance, Instance3) else ():
+        message = message.replace(old, new)
+    return message
+
+
 @contextmanager
 def one(fmu: Path, exchange: bool = False) -> Iterator[tuple[Any, list[str]]]:
     """An instance, for co-simulation or model exchange, and the messages that come from it."""
     messages: list[str] = []
     with instantiated(fmu, read_description(fmu), messages, exchange) as (_, instance):
-        yield instance, messages
+        yield Instance3(instance) if isinstance(instance, (fmi3.FMU3Slave, fmi3.FMU3Model)) else instance, messages
 
 
 def another(instance: Any) -> Any:
     """A further instance of the same extracted FMU."""
-    made = fmpy.fmi2.FMU2Slave(
-        guid=instance.guid, unzipDirectory=instance.unzipDirectory, modelIdentifier=instance.modelIdentifier
+    kind = fmi3.FMU3Slave if isinstance(instance, Instance3) else fmi2.FMU2Slave
+    made = kind(
+        guid=instance.guid,
+        unzipDirectory=instance.unzipDirectory,
+        modelIdentifier=instance.modelIdentifier,
+        instanceName="another",
     )
     made.instantiate(loggingOn=True)
-    return made
+    return Instance3(made) if isinstance(instance, Instance3) else made

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from hovercraft_fmu import hosts
+from hovercraft_fmu.fmu.description import NATIVE, Flavour
 from hovercraft_fmu.fmu.native_package import C_FOLDER, OPTIONS, sources
 from hovercraft_fmu.hosts import compiler
 from hovercraft_fmu.model.craft import Craft
@@ -17,6 +19,8 @@ from hovercraft_fmu.model.integrators import INTEGRATORS, Stretch
 from hovercraft_fmu.model.subcycling import Settings
 
 C_TESTS = Path(__file__).parent / "c"
+C_INCLUDES = ("-I", str(Path(hosts.__file__).parent))
+"""Of the calls of both standards."""
 OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
 NO_RAMP = Controls(0.0)
 
@@ -29,10 +33,10 @@ def c_compiler() -> str:
     return name
 
 
-def written_sources(folder: Path) -> Path:
-    """The sources of the native FMU, generated header and all, in `folder`."""
+def written_sources(folder: Path, flavour: Flavour = NATIVE) -> Path:
+    """The sources of a native FMU, generated header and all, in `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, content in sources("0" * 32).items():
+    for name, content in sources("0" * 32, flavour).items():
         (folder / name).write_bytes(content)
     return folder
 

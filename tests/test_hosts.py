@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu import document
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from hovercraft_fmu.fmu.document import pages
 from hovercraft_fmu.fmu.interface import observe_motion
 from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, HOSTS, hosts_of, run_in
@@ -18,7 +19,7 @@ from hovercraft_fmu.model.subcycling import advance
 from tests.conftest import ROOT
 
 DOCUMENTATION = ROOT / "hovercraft_fmu" / "fmu" / "documentation"
-TABLES = {"python": "checked.md", "native": "checked_native.md"}
+TABLES = {"python": "checked.md", "native": "checked_native.md", "native3": "checked_native3.md"}
 
 
 @pytest.mark.parametrize("name", HOSTS)
@@ -50,16 +51,16 @@ def test_the_table_is_what_the_command_prints(each_fmu: Path, flavour: str) -> N
     assert re.search(r"\| fmpy \| \d", table)
 
 
-@pytest.mark.parametrize("native", [False, True])
+@pytest.mark.parametrize("flavour", [PYTHON, NATIVE, NATIVE3], ids=lambda flavour: flavour.identifier)
 def test_the_page_shows_the_table_and_is_made_without_it(
-    native: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    flavour: Flavour, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The first build comes before the first check."""
-    host = "<td>no Python</td>" if native else "<td>LD_PRELOAD="
-    page = pages(native)["index.html"]
+    host = "<td>LD_PRELOAD=" if flavour == PYTHON else "<td>no Python</td>"
+    page = pages(flavour)["index.html"]
     assert "Where it ran" in page
     assert host in page
     folder = tmp_path / "documentation"
     shutil.copytree(DOCUMENTATION, folder, ignore=shutil.ignore_patterns("checked*.md"))
     monkeypatch.setattr(document, "FOLDER", folder)
-    assert "Where it ran" not in pages(native)["index.html"]
+    assert "Where it ran" not in pages(flavour)["index.html"]

@@ -1,4 +1,4 @@
-"""FMI 2.0 co-simulation beyond what the Python FMU can do: ramps, derivatives, status, pointers, refused instances.
+"""Co-simulation beyond what the Python FMU can do: ramps, derivatives, status, pointers, refused instances.
 
 What both flavours must do is in test_lifecycle.py, model exchange in test_exchange.py."""
 
@@ -10,7 +10,7 @@ import sys
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from ctypes import CDLL, byref, c_double, c_int, c_size_t, c_uint, c_void_p, cast
+from ctypes import CDLL, byref, c_bool, c_double, c_int, c_size_t, c_uint, c_void_p, cast
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +21,15 @@ from fmpy.fmi1 import FMICallException
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hovercraft_fmu.fmu.description import NATIVE
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STEP_UNSTABLE
-from hovercraft_fmu.hosts import NATIVE_HOSTS, run_in
+from hovercraft_fmu.fmu.native_package import library
+from hovercraft_fmu.hosts import hosts_of, run_in
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, read_description, run_fmu, run_model
 from tests.blobs import signed, with_word
-from tests.conftest import ROOT
-from tests.lowlevel import count, everything, get, one, put, reference, start
+from tests.conftest import FMI_2, ROOT
+from tests.lowlevel import Instance3, count, everything, get, named, one, put, reference, start, worded
 from tests.native import c_compiler
 from tests.test_native_platforms import SANITIZERS
 
@@ -39,8 +40,8 @@ STEPS = {"semi_implicit_euler": 0.001, "drag_implicit": 0.02, "rk4": 0.1, "adapt
 
 
 @pytest.fixture(scope="module")
-def shared(native_fmu: Path) -> Iterator[tuple[Any, list[str]]]:
-    with one(native_fmu) as made:
+def shared(each_native_fmu: Path) -> Iterator[tuple[Any, list[str]]]:
+    with one(each_native_fmu) as made:
         yield made
 
 
@@ -63,17 +64,18 @@ def test_every_scene_and_method_is_close_to_the_bare_model(name: str, method: st
         assert (gap <= 1e-12 * np.maximum(1.0, np.abs(expected[column]))).all(), column
 
 
-def test_other_hosts_give_the_bits_that_fmpy_gives(native_fmu: Path) -> None:
-    expected = run_in("fmpy", native_fmu)
-    for name in ("libcosimpy", "ecospy", "fmucontainer", "C host"):
-        if missing := NATIVE_HOSTS[name].missing():
+def test_other_hosts_give_the_bits_that_fmpy_gives(each_native_fmu: Path) -> None:
+    expected = run_in("fmpy", each_native_fmu)
+    for name, host in hosts_of(each_native_fmu).items():
+        if missing := host.missing():
             pytest.skip(f"{name}: {missing}")
-        assert run_in(name, native_fmu) == expected, name
+        assert run_in(name, each_native_fmu) == expected, name
 
 
 # ---- ramps
 
 
+@FMI_2
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "drag_implicit"])
 def test_a_ramp_is_many_small_steps(method: str, instance: Any) -> None:
     """First-order methods: to the bit as if the inputs were set anew at every sub-step."""
@@ -95,6 +97,7 @@ def test_a_ramp_is_many_small_steps(method: str, instance: Any) -> None:
     assert ends[0] == ends[1]
 
 
+@FMI_2
 @pytest.mark.parametrize("method", METHODS)
 def test_a_ramp_follows_a_fine_staircase(method: str, instance: Any) -> None:
     """A staircase of half-way values at 1 ms: the first-order methods lag half a sub-step behind it, 5e-5."""
@@ -115,6 +118,7 @@ def test_a_ramp_follows_a_fine_staircase(method: str, instance: Any) -> None:
     assert ends[0] != ends[1]
 
 
+@FMI_2
 def test_a_ramp_goes_on_until_the_input_is_set_again(instance: Any) -> None:
     start(instance)
     put(instance, thrust=1.0)
@@ -131,6 +135,7 @@ def test_a_ramp_goes_on_until_the_input_is_set_again(instance: Any) -> None:
     assert get(instance, "port_thruster") == [0.3125]
 
 
+@FMI_2
 def test_a_ramp_saturates_and_warns(instance: Any, messages: list[str]) -> None:
     start(instance)
     put(instance, thrust=9.0, drag_coefficient=0.0)
@@ -142,6 +147,7 @@ def test_a_ramp_saturates_and_warns(instance: Any, messages: list[str]) -> None:
     assert messages == ["thrust = 14.0: is outside its limits and is held at 10.0 (said once)"]
 
 
+@FMI_2
 def test_ramps_are_part_of_the_state(instance: Any) -> None:
     start(instance)
     ramp(instance, thrust=0.5, port_thruster=0.1)
@@ -159,6 +165,7 @@ def test_ramps_are_part_of_the_state(instance: Any) -> None:
     assert get(instance, "thrust", "port_thruster") == [5.0, 0.0]
 
 
+@FMI_2
 def test_a_ramp_of_zero_changes_no_bit(instance: Any) -> None:
     """Without a ramp the bits are those of a step that never heard of one."""
     ends = []
@@ -198,6 +205,7 @@ RAMP_FAULTS: dict[str, tuple[Callable[[Any], object], str]] = {
 }
 
 
+@FMI_2
 @pytest.mark.parametrize("name", RAMP_FAULTS)
 def test_faults_of_derivatives(name: str, instance: Any, messages: list[str]) -> None:
     fault, message = RAMP_FAULTS[name]
@@ -211,6 +219,7 @@ def test_faults_of_derivatives(name: str, instance: Any, messages: list[str]) ->
     assert bytes(instance.serializeFMUstate(instance.getFMUstate())) == before
 
 
+@FMI_2
 def test_a_ramp_without_end_is_refused_by_the_step(instance: Any, messages: list[str]) -> None:
     start(instance)
     ramp(instance, thrust=1.7e308)
@@ -267,11 +276,12 @@ def test_an_output_derivative_that_is_no_number_is_refused(instance: Any, messag
 
 def function(instance: Any, name: str) -> Any:
     """A function of the library as it is: fmpy's own checks its arguments, and raises."""
-    found = getattr(CDLL(instance.dll._name), name)
+    found = getattr(CDLL(instance.dll._name), named(instance, name))
     found.restype = c_int
     return found
 
 
+@FMI_2
 def test_status_and_the_last_successful_time(instance: Any, messages: list[str]) -> None:
     start(instance, 2.0)
     status, time, number, text = c_int(-1), c_double(), c_int(-1), c_void_p()
@@ -298,15 +308,22 @@ def test_status_and_the_last_successful_time(instance: Any, messages: list[str])
     assert messages[-1] == "fmi2CancelStep: must be called while a step is pending; none ever is"
 
 
+def status_of_step(instance: Any, point: float, step: float) -> int:
+    """Of the function itself: fmpy keeps a warning to itself."""
+    more = (
+        [byref(made) for made in (c_bool(), c_bool(), c_bool(), c_double())] if isinstance(instance, Instance3) else []
+    )
+    arguments = c_void_p(instance.component), c_double(point), c_double(step), c_bool(True)
+    return int(function(instance, "fmi2DoStep")(*arguments, *more))
+
+
 def test_a_step_that_warns_says_so_and_goes_on(instance: Any, messages: list[str]) -> None:
     put(instance, velocity__x=100.0, step_size=0.05)
     start(instance)
-    step = function(instance, "fmi2DoStep")
-    arguments = (c_void_p(instance.component), c_double(0.0), c_double(0.05), 1)
-    assert step(*arguments) == WARNING
+    assert status_of_step(instance, 0.0, 0.05) == WARNING
     assert count(instance, "warnings") == STEP_UNSTABLE
     assert len(messages) == 1
-    assert step(c_void_p(instance.component), c_double(0.05), c_double(0.05), 1) == OK
+    assert status_of_step(instance, 0.05, 0.05) == OK
 
 
 def test_after_an_error_a_reset_or_a_state_sets_the_run_right(instance: Any) -> None:
@@ -349,7 +366,7 @@ def test_a_buffer_that_is_too_small_is_refused(instance: Any, messages: list[str
     buffer = (c_int * size)()
     serialize = function(instance, "fmi2SerializeFMUstate")
     assert serialize(c_void_p(instance.component), state, buffer, c_size_t(size - 1)) == ERROR
-    assert messages[-1] == f"fmi2SerializeFMUstate: size = {size - 1}: must be {size} bytes"
+    assert messages[-1] == worded(instance, f"fmi2SerializeFMUstate: size = {size - 1}: must be {size} bytes")
     instance.freeFMUstate(state)
 
 
@@ -369,6 +386,7 @@ ONLY_AN_INSTANCE = ("fmi2EnterInitializationMode", "fmi2ExitInitializationMode",
                     "fmi2EnterContinuousTimeMode", "fmi2GetEventIndicators")  # fmt: skip
 
 
+@FMI_2
 @pytest.mark.parametrize("name", CALLS)
 def test_null_arguments_are_refused(name: str, instance: Any, messages: list[str]) -> None:
     start(instance)
@@ -388,6 +406,7 @@ def test_null_arguments_are_refused(name: str, instance: Any, messages: list[str
     assert everything(instance) == before
 
 
+@FMI_2
 def test_a_null_instance_is_refused(instance: Any) -> None:
     for name in ONLY_AN_INSTANCE:
         assert function(instance, name)(c_void_p(None), c_void_p(None)) == ERROR
@@ -398,6 +417,7 @@ def test_a_null_instance_is_refused(instance: Any) -> None:
     instance.dll.fmi2FreeInstance(c_void_p(None))
 
 
+@FMI_2
 def test_empty_lists_are_fine(instance: Any) -> None:
     start(instance)
     for name in ("Real", "Integer", "Boolean", "String"):
@@ -447,15 +467,15 @@ def test_a_forged_sub_step_is_refused(step_size: float, instance: Any, messages:
 
 
 @pytest.fixture(scope="module")
-def library(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def loaded(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The library of the FMU, without fmpy around it."""
     if sys.platform != "linux" or os.uname().machine != "x86_64":
         pytest.skip("not x86-64 Linux")
     folder = tmp_path_factory.mktemp("library")
     extract(str(native_fmu), unzipdir=str(folder))
-    loaded = CDLL(str(folder / "binaries" / "linux64" / f"{NATIVE.identifier}.so"))
-    loaded.fmi2Instantiate.restype = c_void_p
-    return loaded
+    found = CDLL(str(folder / "binaries" / library("x86_64-linux", NATIVE)))
+    found.fmi2Instantiate.restype = c_void_p
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -475,35 +495,35 @@ class Callbacks:
         self.said.append((status, category.decode(), message.decode()))
 
 
-def test_an_instance_that_cannot_be_is_refused_with_a_word(library: Any, guid: bytes) -> None:
+def test_an_instance_that_cannot_be_is_refused_with_a_word(loaded: Any, guid: bytes) -> None:
     callbacks = Callbacks()
     foreign = b"{%s%n%d\xff#r1#}"
-    assert library.fmi2Instantiate(b"a", 1, foreign, b"", byref(callbacks.made), 0, 0) is None
-    assert library.fmi2Instantiate(b"a", 1, None, b"", byref(callbacks.made), 0, 0) is None
-    assert library.fmi2Instantiate(b"a", 2, guid, b"", byref(callbacks.made), 0, 0) is None
+    assert loaded.fmi2Instantiate(b"a", 1, foreign, b"", byref(callbacks.made), 0, 0) is None
+    assert loaded.fmi2Instantiate(b"a", 1, None, b"", byref(callbacks.made), 0, 0) is None
+    assert loaded.fmi2Instantiate(b"a", 2, guid, b"", byref(callbacks.made), 0, 0) is None
     text = f"must be '{guid.decode()}', as in modelDescription.xml"
     assert callbacks.said == [
         (ERROR, "logStatusError", f"fmuGUID = '{{?s?n?d??r1?}}': {text}"),
         (ERROR, "logStatusError", f"fmuGUID = 'NULL': {text}"),
         (ERROR, "logStatusError", "fmuType = 2: must be fmi2ModelExchange, 0, or fmi2CoSimulation, 1"),
     ]
-    assert library.fmi2Instantiate(b"a", 1, foreign, b"", None, 0, 0) is None
+    assert loaded.fmi2Instantiate(b"a", 1, foreign, b"", None, 0, 0) is None
 
 
-def test_an_instance_lives_without_callbacks(library: Any, guid: bytes) -> None:
+def test_an_instance_lives_without_callbacks(loaded: Any, guid: bytes) -> None:
     for callbacks in (None, byref(fmi2.fmi2CallbackFunctions())):
         for name in (b"a", b"", None):
-            made = c_void_p(library.fmi2Instantiate(name, 1, guid, None, callbacks, 0, 1))
+            made = c_void_p(loaded.fmi2Instantiate(name, 1, guid, None, callbacks, 0, 1))
             assert made
-            assert library.fmi2SetupExperiment(made, 0, c_double(0.0), c_double(0.0), 0, c_double(0.0)) == OK
-            assert library.fmi2EnterInitializationMode(made) == OK
-            assert library.fmi2DoStep(made, c_double(0.0), c_double(0.1), 1) == ERROR
-            assert library.fmi2ExitInitializationMode(made) == OK
-            assert library.fmi2DoStep(made, c_double(0.0), c_double(0.1), 1) == OK
-            library.fmi2FreeInstance(made)
+            assert loaded.fmi2SetupExperiment(made, 0, c_double(0.0), c_double(0.0), 0, c_double(0.0)) == OK
+            assert loaded.fmi2EnterInitializationMode(made) == OK
+            assert loaded.fmi2DoStep(made, c_double(0.0), c_double(0.1), 1) == ERROR
+            assert loaded.fmi2ExitInitializationMode(made) == OK
+            assert loaded.fmi2DoStep(made, c_double(0.0), c_double(0.1), 1) == OK
+            loaded.fmi2FreeInstance(made)
 
 
-def test_the_hosts_memory_is_used_and_given_back(library: Any, guid: bytes) -> None:
+def test_the_hosts_memory_is_used_and_given_back(loaded: Any, guid: bytes) -> None:
     alive: dict[int, Any] = {}
 
     def allocate(n: int, size: int) -> int:
@@ -515,36 +535,36 @@ def test_the_hosts_memory_is_used_and_given_back(library: Any, guid: bytes) -> N
     callbacks = fmi2.fmi2CallbackFunctions()
     callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(allocate)
     callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(lambda address: alive.pop(address) and None)
-    made = c_void_p(library.fmi2Instantiate(b"a", 1, guid, None, byref(callbacks), 0, 1))
+    made = c_void_p(loaded.fmi2Instantiate(b"a", 1, guid, None, byref(callbacks), 0, 1))
     state = c_void_p()
-    assert library.fmi2GetFMUstate(made, byref(state)) == OK
+    assert loaded.fmi2GetFMUstate(made, byref(state)) == OK
     assert len(alive) == 2
-    assert library.fmi2FreeFMUstate(made, byref(state)) == OK
-    library.fmi2FreeInstance(made)
+    assert loaded.fmi2FreeFMUstate(made, byref(state)) == OK
+    loaded.fmi2FreeInstance(made)
     assert alive == {}
     callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(lambda _n, _size: 0)
-    assert library.fmi2Instantiate(b"a", 1, guid, None, byref(callbacks), 0, 1) is None
+    assert loaded.fmi2Instantiate(b"a", 1, guid, None, byref(callbacks), 0, 1) is None
 
 
-def test_what_is_logged(library: Any, guid: bytes) -> None:
+def test_what_is_logged(loaded: Any, guid: bytes) -> None:
     """Errors always, until the host says otherwise; warnings where logging is on; by category where it asks."""
     callbacks = Callbacks()
-    made = c_void_p(library.fmi2Instantiate(b"a", 1, guid, None, byref(callbacks.made), 0, 0))
+    made = c_void_p(loaded.fmi2Instantiate(b"a", 1, guid, None, byref(callbacks.made), 0, 0))
 
     def told() -> list[int]:
         """After a reset: a step that warns, and one that is refused."""
         callbacks.said.clear()
-        assert library.fmi2Reset(made) == OK
-        assert library.fmi2SetReal(made, byref(c_uint(0)), c_size_t(1), byref(c_double(99.0))) == OK
-        assert library.fmi2EnterInitializationMode(made) == OK
-        assert library.fmi2ExitInitializationMode(made) == OK
-        assert library.fmi2DoStep(made, c_double(0.0), c_double(0.1), 1) == WARNING
-        assert library.fmi2DoStep(made, c_double(5.0), c_double(0.1), 1) == ERROR
+        assert loaded.fmi2Reset(made) == OK
+        assert loaded.fmi2SetReal(made, byref(c_uint(0)), c_size_t(1), byref(c_double(99.0))) == OK
+        assert loaded.fmi2EnterInitializationMode(made) == OK
+        assert loaded.fmi2ExitInitializationMode(made) == OK
+        assert loaded.fmi2DoStep(made, c_double(0.0), c_double(0.1), 1) == WARNING
+        assert loaded.fmi2DoStep(made, c_double(5.0), c_double(0.1), 1) == ERROR
         return [status for status, _, _ in callbacks.said]
 
     def choose(on: int, *names: bytes) -> int:
         listed = (fmi2.fmi2String * max(1, len(names)))(*names)
-        return int(library.fmi2SetDebugLogging(made, on, c_size_t(len(names)), listed))
+        return int(loaded.fmi2SetDebugLogging(made, on, c_size_t(len(names)), listed))
 
     assert told() == [ERROR]
     assert choose(1) == OK
@@ -566,29 +586,27 @@ def test_what_is_logged(library: Any, guid: bytes) -> None:
     assert choose(1, b"logStatusWarning", b"log%s") == ERROR
     names = "logStatusWarning, logStatusError, logAll"
     assert callbacks.said[-1][2] == f"log category 'log?s': must be one of {names}"
-    library.fmi2FreeInstance(made)
+    loaded.fmi2FreeInstance(made)
 
 
-def test_versions(library: Any) -> None:
-    library.fmi2GetVersion.restype = library.fmi2GetTypesPlatform.restype = fmi2.fmi2String
-    assert (library.fmi2GetVersion(), library.fmi2GetTypesPlatform()) == (b"2.0", b"default")
+def test_versions(loaded: Any) -> None:
+    loaded.fmi2GetVersion.restype = loaded.fmi2GetTypesPlatform.restype = fmi2.fmi2String
+    assert (loaded.fmi2GetVersion(), loaded.fmi2GetTypesPlatform()) == (b"2.0", b"default")
 
 
 # ---- sanitized
 
 
-@pytest.fixture(scope="module")
-def sanitized(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sanitized(fmu: Path, flavour: Flavour, folder: Path) -> Path:
     """The FMU with a library for this machine that watches memory and undefined behaviour."""
-    folder = tmp_path_factory.mktemp("sanitized")
-    with zipfile.ZipFile(native_fmu) as archive:
+    with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     for name, content in files.items():
         if name.startswith("sources/"):
             (folder / Path(name).name).write_bytes(content)
     command = [c_compiler(), "-std=c11", "-O1", "-ffp-contract=off", *SANITIZERS["address"], "-shared", "-fPIC"]
-    subprocess.run([*command, *NATIVE.sources, "-lm", "-o", "x.so"], cwd=folder, check=True)
-    files[f"binaries/linux64/{NATIVE.identifier}.so"] = (folder / "x.so").read_bytes()
+    subprocess.run([*command, *flavour.sources, "-lm", "-o", "x.so"], cwd=folder, check=True)
+    files[f"binaries/{library('x86_64-linux', flavour)}"] = (folder / "x.so").read_bytes()
     path = folder / "Sanitized.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in files.items():
@@ -596,9 +614,16 @@ def sanitized(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return path
 
 
+@pytest.fixture(scope="module")
+def sanitized_fmus(native_fmu: Path, native3_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Those of FMI 2.0 and of FMI 3.0."""
+    pairs = ((native_fmu, NATIVE), (native3_fmu, NATIVE3))
+    return [sanitized(fmu, flavour, tmp_path_factory.mktemp("sanitized")) for fmu, flavour in pairs]
+
+
 @pytest.mark.once
-def test_clean_under_sanitizers_over_the_life_cycle(sanitized: Path) -> None:
-    """The tests of the life cycle and of this file, again, on the sanitized library."""
+def test_clean_under_sanitizers_over_the_life_cycle(sanitized_fmus: list[Path]) -> None:
+    """The tests of the life cycle and of this file, and FMI 3.0's own, again, on the sanitized libraries."""
     if os.environ.get("NATIVE_FMU"):
         pytest.skip("this is that run")
     runtime = [
@@ -607,18 +632,19 @@ def test_clean_under_sanitizers_over_the_life_cycle(sanitized: Path) -> None:
         ).stdout.strip()
         for name in ("libasan.so", "libubsan.so")
     ]
-    env = {**os.environ, "NATIVE_FMU": str(sanitized), "LD_PRELOAD": ":".join(runtime), "CI": "",
+    two, three = map(str, sanitized_fmus)
+    env = {**os.environ, "NATIVE_FMU": two, "NATIVE3_FMU": three, "LD_PRELOAD": ":".join(runtime), "CI": "",
            "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=0"}  # fmt: skip
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/test_lifecycle.py",
-               "tests/test_native.py", "tests/test_exchange.py", "-k",
-               "not python and not sanitize and not other_hosts"]  # fmt: skip
+               "tests/test_native.py", "tests/test_exchange.py", "tests/test_fmi3.py",
+               "-k", "not python and not sanitize and not other_hosts and not bits_of_fmi_2"]  # fmt: skip
     done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False, timeout=900)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     assert " failed" not in done.stdout
     assert int(done.stdout.rsplit("\n", 2)[-2].split(" passed")[0].split()[-1]) > 300
 
 
-def test_the_sanitized_library_would_tell(sanitized: Path, tmp_path: Path) -> None:
+def test_the_sanitized_library_would_tell(sanitized_fmus: list[Path], tmp_path: Path) -> None:
     """A test of the test: one byte read behind a state that is too short is found."""
     code = """
 import ctypes, sys
@@ -629,11 +655,11 @@ libc = ctypes.CDLL(None)
 libc.calloc.restype = ctypes.c_void_p
 print(library.fmi2SetFMUstate(made, ctypes.c_void_p(libc.calloc(1, 16))))
 """
-    extract(str(sanitized), unzipdir=str(tmp_path))
-    library = tmp_path / "binaries" / "linux64" / f"{NATIVE.identifier}.so"
+    extract(str(sanitized_fmus[0]), unzipdir=str(tmp_path))
+    found = tmp_path / "binaries" / library("x86_64-linux", NATIVE)
     runtime = subprocess.run([c_compiler(), "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
     env = {**os.environ, "LD_PRELOAD": runtime.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
-    command = [sys.executable, "-c", code, str(library), str(read_description(sanitized).guid)]
+    command = [sys.executable, "-c", code, str(found), str(read_description(sanitized_fmus[0]).guid)]
     done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "ERROR: AddressSanitizer" in done.stderr

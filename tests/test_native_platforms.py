@@ -8,18 +8,18 @@ import sys
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
-from hovercraft_fmu.fmu.description import NATIVE
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, MOTION, STATES
 from hovercraft_fmu.fmu.native_header import constant
-from hovercraft_fmu.fmu.native_package import OPTIONS, PLATFORMS, compiler
+from hovercraft_fmu.fmu.native_package import OPTIONS, PLATFORMS, compiler, library
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Run, plan, schedule
 from tests.lowlevel import one
-from tests.native import C_TESTS, c_compiler
+from tests.native import C_INCLUDES, C_TESTS, c_compiler
 
 pytestmark = pytest.mark.once
 
@@ -64,29 +64,39 @@ def _braced(parts: Iterable[str]) -> str:
     return "{" + ", ".join(parts) + "}"
 
 
+class Unpacked(NamedTuple):
+    """An FMU's folder."""
+
+    folder: Path
+    flavour: Flavour
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """To compile a host for it."""
+        return (f"-DFMI={self.flavour.fmi}", "-I", str(self.folder / "sources"), *C_INCLUDES)
+
+
 @pytest.fixture(scope="module")
-def unpacked(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def unpacked(each_native_fmu: Path, standard: int, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
     folder = tmp_path_factory.mktemp("unpacked")
-    with zipfile.ZipFile(native_fmu) as archive:
+    with zipfile.ZipFile(each_native_fmu) as archive:
         archive.extractall(folder)
     (folder / "sources" / "runs.h").write_text(runs_header())
-    return folder
+    return Unpacked(folder, NATIVE if standard == 2 else NATIVE3)
 
 
-def hashes(unpacked: Path, platform: str, library: str, *runner: str, env: Elsewhere | None = None) -> dict[str, str]:
+def hashes(unpacked: Unpacked, platform: str, *runner: str, env: Elsewhere | None = None) -> dict[str, str]:
     """What the host in C prints on a platform: run -> hash."""
-    where = (unpacked / "binaries" / library).parent
+    path = unpacked.folder / "binaries" / library(platform, unpacked.flavour)
     target = PLATFORMS[platform]
     program = "trajectory.exe" if target.suffix == ".dll" else "trajectory"
-    options = (
-        ["-nostdlib", "-Wl,--entry=start", "-lkernel32"] if target.suffix == ".dll" else ["-ldl"]
-    )  # fmt: skip
-    command = [*compiler(target), f'-DLIBRARY="./{Path(library).name}"', "-I", str(unpacked / "sources"),
-               str(C_TESTS / "trajectory.c"), *options, "-o", program]  # fmt: skip
-    done = subprocess.run(command, cwd=where, capture_output=True, text=True, check=False)
+    options = ["-nostdlib", "-Wl,--entry=start", "-lkernel32"] if target.suffix == ".dll" else ["-ldl"]
+    command = [*compiler(target), f'-DLIBRARY="./{path.name}"', *unpacked.options, str(C_TESTS / "trajectory.c"),
+               *options, "-o", program]  # fmt: skip
+    done = subprocess.run(command, cwd=path.parent, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     done = subprocess.run(
-        [*runner, f"./{program}"], cwd=where, env={**os.environ, **(env or {})}, capture_output=True, text=True,
+        [*runner, f"./{program}"], cwd=path.parent, env={**os.environ, **(env or {})}, capture_output=True, text=True,
         check=False, timeout=600,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -96,19 +106,19 @@ def hashes(unpacked: Path, platform: str, library: str, *runner: str, env: Elsew
 
 
 @pytest.fixture(scope="module")
-def here(unpacked: Path) -> dict[str, str]:
+def here(unpacked: Unpacked) -> dict[str, str]:
     """The hashes on this machine."""
     if sys.platform != "linux" or os.uname().machine != "x86_64":
         pytest.skip("not x86-64 Linux")
-    return hashes(unpacked, "x86_64-linux", f"linux64/{NATIVE.identifier}.so")
+    return hashes(unpacked, "x86_64-linux")
 
 
-def test_the_hash_is_that_of_the_trajectory(here: dict[str, str], native_fmu: Path) -> None:
+def test_the_hash_is_that_of_the_trajectory(here: dict[str, str], each_native_fmu: Path) -> None:
     """Through fmpy, one run."""
     run = runs()["turn_rk4"]
     references = [BY_NAME[name].reference for name in HASHED]
     total = 0xCBF29CE484222325
-    with one(native_fmu) as (instance, _):
+    with one(each_native_fmu) as (instance, _):
         _start(instance, run)
         for time, end, held in schedule(run):
             instance.setReal([BY_NAME[name].reference for name in INPUTS], list(held))
@@ -128,37 +138,40 @@ def _start(instance: Any, run: Run) -> None:
     instance.exitInitializationMode()
 
 
-def test_the_same_bits_on_arm64(unpacked: Path, here: dict[str, str]) -> None:
+def test_the_same_bits_on_arm64(unpacked: Unpacked, here: dict[str, str]) -> None:
     qemu = shutil.which("qemu-aarch64")
     if not qemu or not ARM_LIBRARIES.exists():
         pytest.skip("no qemu-aarch64, or no libraries for it: apt-get install qemu-user libc6-arm64-cross")
-    library = f"aarch64-linux/{NATIVE.identifier}.so"
-    assert hashes(unpacked, "aarch64-linux", library, qemu, "-L", str(ARM_LIBRARIES)) == here
+    assert hashes(unpacked, "aarch64-linux", qemu, "-L", str(ARM_LIBRARIES)) == here
 
 
-def test_the_same_bits_on_windows(unpacked: Path, here: dict[str, str], tmp_path: Path) -> None:
+def test_the_same_bits_on_windows(
+    unpacked: Unpacked, here: dict[str, str], tmp_path_factory: pytest.TempPathFactory
+) -> None:
     wine = shutil.which("wine64") or shutil.which(WINE)
     if not wine:
         pytest.skip("no wine64: apt-get install wine64")
-    env = {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all", "DISPLAY": ""}
-    assert hashes(unpacked, "x86_64-windows", f"win64/{NATIVE.identifier}.dll", wine, env=env) == here
+    # one for all FMUs: to make it takes longer than the runs
+    prefix = tmp_path_factory.getbasetemp() / "wine"
+    env = {"WINEPREFIX": str(prefix), "WINEDEBUG": "-all", "DISPLAY": ""}
+    assert hashes(unpacked, "x86_64-windows", wine, env=env) == here
 
 
 # ---- many at once, again and again
 
 
-def host(unpacked: Path, name: str, *options: str, library: bool) -> Path:
+def host(unpacked: Unpacked, name: str, *options: str, linked: bool) -> Path:
     """A host of tests/c: with the FMU's library, or compiled together with its sources."""
     if sys.platform != "linux":
         pytest.skip("not Linux")
-    program = unpacked / f"{name}{''.join(options)}"
-    folder = unpacked / "binaries" / "linux64"
+    program = unpacked.folder / f"{name}{''.join(options)}"
+    path = unpacked.folder / "binaries" / library("x86_64-linux", unpacked.flavour)
     parts = (
-        [str(folder / f"{NATIVE.identifier}.so"), f"-Wl,-rpath,{folder}"]
-        if library
-        else [str(unpacked / "sources" / source) for source in NATIVE.sources]
+        [str(path), f"-Wl,-rpath,{path.parent}"]
+        if linked
+        else [str(unpacked.folder / "sources" / source) for source in unpacked.flavour.sources]
     )
-    command = [c_compiler(), *OPTIONS, "-Wall", "-Wextra", "-Werror", "-I", str(unpacked / "sources"), *options]
+    command = [c_compiler(), *OPTIONS, "-Wall", "-Wextra", "-Werror", *unpacked.options, *options]
     done = subprocess.run(
         [*command, str(C_TESTS / f"{name}.c"), *parts, "-pthread", "-lm", "-o", str(program)],
         capture_output=True, text=True, check=False,
@@ -177,17 +190,17 @@ SANITIZERS = {"address": ("-g", "-fsanitize=address,undefined,float-cast-overflo
               "thread": ("-g", "-fsanitize=thread")}  # fmt: skip
 
 
-def test_eight_threads_of_a_thousand_instances(unpacked: Path) -> None:
-    assert printed_by(host(unpacked, "many", library=True)) == "8000"
+def test_eight_threads_of_a_thousand_instances(unpacked: Unpacked) -> None:
+    assert printed_by(host(unpacked, "many", linked=True)) == "8000"
 
 
 @pytest.mark.parametrize("sanitizer", SANITIZERS)
-def test_eight_threads_of_a_thousand_instances_sanitized(sanitizer: str, unpacked: Path) -> None:
+def test_eight_threads_of_a_thousand_instances_sanitized(sanitizer: str, unpacked: Unpacked) -> None:
     """Memory, undefined behaviour, leaks; and races."""
-    assert printed_by(host(unpacked, "many", *SANITIZERS[sanitizer], library=False)) == "8000"
+    assert printed_by(host(unpacked, "many", *SANITIZERS[sanitizer], linked=False)) == "8000"
 
 
-def test_a_hundred_thousand_cycles_leave_nothing_behind(unpacked: Path) -> None:
-    grown = int(printed_by(host(unpacked, "cycles", library=True)))
+def test_a_hundred_thousand_cycles_leave_nothing_behind(unpacked: Unpacked) -> None:
+    grown = int(printed_by(host(unpacked, "cycles", linked=True)))
     print(f"resident memory grew by {grown} bytes over 90 000 cycles")
     assert grown < 1_000_000

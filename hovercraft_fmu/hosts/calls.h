@@ -12,6 +12,7 @@
 #define FUNCTION(name) name
 #endif
 
+enum call_use { CALL_STEPS, CALL_EXCHANGE };
 enum { CALL_OK, CALL_WARNED, CALL_DISCARDED, CALL_REFUSED };
 
 /* Where messages go; NULL: nowhere. */
@@ -29,8 +30,10 @@ static inline void call_log(fmi3InstanceEnvironment environment, fmi3Status stat
         call_tell(status, message);
 }
 
-static inline void *call_instantiate(const char *token, const char *resources)
+static inline void *call_instantiate(enum call_use use, const char *token, const char *resources)
 {
+    if (use == CALL_EXCHANGE)
+        return FUNCTION(fmi3InstantiateModelExchange)("craft", token, resources, fmi3False, fmi3True, NULL, call_log);
     return FUNCTION(fmi3InstantiateCoSimulation)("craft", token, resources, fmi3False, fmi3True, fmi3False, fmi3False,
                                                  NULL, 0, NULL, call_log, NULL);
 }
@@ -64,6 +67,31 @@ static inline int call_step(void *craft, double point, double step)
     bool event, terminate, early;
     double last;
     return FUNCTION(fmi3DoStep)(craft, point, step, fmi3True, &event, &terminate, &early, &last);
+}
+
+static inline int call_go_continuous(void *craft)
+{
+    return FUNCTION(fmi3EnterContinuousTimeMode)(craft);
+}
+
+static inline int call_set_time(void *craft, double time)
+{
+    return FUNCTION(fmi3SetTime)(craft, time);
+}
+
+static inline int call_get_states(void *craft, double *states, size_t n)
+{
+    return FUNCTION(fmi3GetContinuousStates)(craft, states, n);
+}
+
+static inline int call_set_states(void *craft, const double *states, size_t n)
+{
+    return FUNCTION(fmi3SetContinuousStates)(craft, states, n);
+}
+
+static inline int call_get_rates(void *craft, double *rates, size_t n)
+{
+    return FUNCTION(fmi3GetContinuousStateDerivatives)(craft, rates, n);
 }
 
 static inline int call_terminate(void *craft)
@@ -118,10 +146,11 @@ static inline void call_log(fmi2ComponentEnvironment environment, fmi2String ins
         call_tell(status, message);
 }
 
-static inline void *call_instantiate(const char *token, const char *resources)
+static inline void *call_instantiate(enum call_use use, const char *token, const char *resources)
 {
     static const fmi2CallbackFunctions callbacks = {call_log, NULL, NULL, NULL, NULL};
-    return FUNCTION(fmi2Instantiate)("craft", fmi2CoSimulation, token, resources, &callbacks, fmi2False, fmi2True);
+    return FUNCTION(fmi2Instantiate)("craft", use == CALL_EXCHANGE ? fmi2ModelExchange : fmi2CoSimulation, token,
+                                     resources, &callbacks, fmi2False, fmi2True);
 }
 
 static inline int call_start(void *craft)
@@ -150,6 +179,31 @@ static inline int call_choose(void *craft, unsigned reference, int item)
 static inline int call_step(void *craft, double point, double step)
 {
     return FUNCTION(fmi2DoStep)(craft, point, step, fmi2True);
+}
+
+static inline int call_go_continuous(void *craft)
+{
+    return FUNCTION(fmi2EnterContinuousTimeMode)(craft);
+}
+
+static inline int call_set_time(void *craft, double time)
+{
+    return FUNCTION(fmi2SetTime)(craft, time);
+}
+
+static inline int call_get_states(void *craft, double *states, size_t n)
+{
+    return FUNCTION(fmi2GetContinuousStates)(craft, states, n);
+}
+
+static inline int call_set_states(void *craft, const double *states, size_t n)
+{
+    return FUNCTION(fmi2SetContinuousStates)(craft, states, n);
+}
+
+static inline int call_get_rates(void *craft, double *rates, size_t n)
+{
+    return FUNCTION(fmi2GetDerivatives)(craft, rates, n);
 }
 
 static inline int call_terminate(void *craft)

@@ -63,7 +63,7 @@ int main(int argc, char **argv)
     const double h = strtod(argv[4], NULL);
     const size_t n_inputs = references(argv[5], inputs), n_outputs = references(argv[6], outputs);
     call_tell = tell;
-    void *craft = call_instantiate(argv[2], argv[3]);
+    void *craft = call_instantiate(CALL_STEPS, argv[2], argv[3]);
     if (!craft)
         return 3;
     demand(call_start(craft), "initialization");

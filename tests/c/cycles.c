@@ -5,16 +5,10 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "fmi2Functions.h"
+#include "calls.h"
 #include "variables.h"
 
 enum { CYCLES = 100000, MOST_BYTES = 4096 };
-
-static void logger(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
-                   fmi2String message, ...)
-{
-    (void)environment, (void)instance, (void)status, (void)category, (void)message;
-}
 
 static long resident(void)
 {
@@ -26,25 +20,20 @@ static long resident(void)
     return pages * sysconf(_SC_PAGESIZE);
 }
 
-static int cycle(fmi2Type type)
+static int cycle(enum call_use use)
 {
-    const int exchange = type == fmi2ModelExchange;
-    static const fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
     static char bytes[MOST_BYTES];
-    fmi2FMUstate state = NULL, restored = NULL;
+    void *state = NULL, *restored = NULL, *craft = call_instantiate(use, GUID, "");
     size_t size = 0;
-    fmi2Component craft = fmi2Instantiate("craft", type, GUID, "", &callbacks, fmi2False, fmi2True);
-    int good = craft && fmi2SetupExperiment(craft, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK &&
-               fmi2EnterInitializationMode(craft) == fmi2OK && fmi2ExitInitializationMode(craft) == fmi2OK &&
-               (exchange ? fmi2SetTime(craft, 0.0) : fmi2DoStep(craft, 0.0, 0.001, fmi2True)) == fmi2OK &&
-               fmi2DoStep(craft, 5.0, 0.1, fmi2True) == fmi2Error &&
-               fmi2GetFMUstate(craft, &state) == fmi2OK &&
-               fmi2SerializedFMUstateSize(craft, state, &size) == fmi2OK && size <= MOST_BYTES &&
-               fmi2SerializeFMUstate(craft, state, bytes, size) == fmi2OK &&
-               fmi2DeSerializeFMUstate(craft, bytes, size, &restored) == fmi2OK &&
-               fmi2SetFMUstate(craft, restored) == fmi2OK && fmi2FreeFMUstate(craft, &state) == fmi2OK &&
-               fmi2FreeFMUstate(craft, &restored) == fmi2OK;
-    fmi2FreeInstance(craft);
+    int good = craft && call_start(craft) == CALL_OK &&
+               (use == CALL_EXCHANGE ? call_set_time(craft, 0.0) : call_step(craft, 0.0, 0.001)) == CALL_OK &&
+               call_step(craft, 5.0, 0.1) == CALL_REFUSED && call_save(craft, &state) == CALL_OK &&
+               call_size(craft, state, &size) == CALL_OK && size <= MOST_BYTES &&
+               call_serialize(craft, state, bytes, size) == CALL_OK &&
+               call_deserialize(craft, bytes, size, &restored) == CALL_OK &&
+               call_restore(craft, restored) == CALL_OK && call_forget(craft, &state) == CALL_OK &&
+               call_forget(craft, &restored) == CALL_OK;
+    call_free(craft);
     return good;
 }
 
@@ -54,7 +43,7 @@ int main(void)
     for (int i = 0; i < CYCLES; i++) {
         if (i == CYCLES / 10)
             before = resident();
-        if (!cycle(i % 4 ? fmi2CoSimulation : fmi2ModelExchange))
+        if (!cycle(i % 4 ? CALL_STEPS : CALL_EXCHANGE))
             return 1;
     }
     printf("%ld\n", resident() - before);

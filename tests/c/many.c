@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmi2Functions.h"
+#include "calls.h"
 #include "variables.h"
 
 enum { THREADS = 8, INSTANCES = 1000, KINDS = 50, STEPS = 3, RESULTS = 6 };
@@ -26,54 +26,50 @@ static int exchanges(int kind)
     return kind % 5 == 4;
 }
 
-static fmi2Component made(int kind)
+static void *made(int kind)
 {
-    static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER}, method = V_INTEGRATOR;
+    static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER};
     const double controls[] = {kind % 11, kind % 7 / 7.0, kind % 5 / 5.0};
-    const int number = kind % 4 + 1;
-    const fmi2Type type = exchanges(kind) ? fmi2ModelExchange : fmi2CoSimulation;
-    fmi2Component craft = fmi2Instantiate("craft", type, GUID, "", NULL, fmi2False, fmi2False);
-    demand(craft != NULL, "fmi2Instantiate");
-    demand(fmi2SetInteger(craft, &method, 1, &number) == fmi2OK, "fmi2SetInteger");
-    demand(fmi2SetupExperiment(craft, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK, "fmi2SetupExperiment");
-    demand(fmi2EnterInitializationMode(craft) == fmi2OK, "fmi2EnterInitializationMode");
-    demand(fmi2ExitInitializationMode(craft) == fmi2OK, "fmi2ExitInitializationMode");
-    demand(fmi2SetReal(craft, inputs, 3, controls) == fmi2OK, "fmi2SetReal");
-    demand(!exchanges(kind) || fmi2EnterContinuousTimeMode(craft) == fmi2OK, "fmi2EnterContinuousTimeMode");
+    void *craft = call_instantiate(exchanges(kind) ? CALL_EXCHANGE : CALL_STEPS, GUID, "");
+    demand(craft != NULL, "instantiate");
+    demand(call_choose(craft, V_INTEGRATOR, kind % 4 + 1) == CALL_OK, "choose");
+    demand(call_start(craft) == CALL_OK, "initialization");
+    demand(call_set(craft, inputs, 3, controls) == CALL_OK, "set");
+    demand(!exchanges(kind) || call_go_continuous(craft) == CALL_OK, "continuous-time mode");
     return craft;
 }
 
-static void finish(fmi2Component craft, double results[RESULTS])
+static void finish(void *craft, double results[RESULTS])
 {
     static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,     V_POSE_HEADING,
                                        V_VELOCITY_X, V_VELOCITY_Y, V_VELOCITY_YAW_RATE};
-    demand(fmi2GetReal(craft, outputs, RESULTS, results) == fmi2OK, "fmi2GetReal");
-    fmi2FreeInstance(craft);
+    demand(call_get(craft, outputs, RESULTS, results) == CALL_OK, "get");
+    call_free(craft);
 }
 
-static void exchange(fmi2Component craft, int k)
+static void exchange(void *craft, int k)
 {
     double states[RESULTS], rates[RESULTS];
-    demand(fmi2SetTime(craft, k * 0.05) == fmi2OK && fmi2GetContinuousStates(craft, states, RESULTS) == fmi2OK &&
-               fmi2GetDerivatives(craft, rates, RESULTS) == fmi2OK,
-           "fmi2GetDerivatives");
+    demand(call_set_time(craft, k * 0.05) == CALL_OK && call_get_states(craft, states, RESULTS) == CALL_OK &&
+               call_get_rates(craft, rates, RESULTS) == CALL_OK,
+           "derivatives");
     for (int i = 0; i < RESULTS; i++)
         states[i] += 0.05 * rates[i];
-    demand(fmi2SetContinuousStates(craft, states, RESULTS) == fmi2OK, "fmi2SetContinuousStates");
+    demand(call_set_states(craft, states, RESULTS) == CALL_OK, "states");
 }
 
-static void step(fmi2Component craft, int kind, int k)
+static void step(void *craft, int kind, int k)
 {
     if (exchanges(kind))
         exchange(craft, k);
     else
-        demand(fmi2DoStep(craft, k * 0.05, 0.05, fmi2True) == fmi2OK, "fmi2DoStep");
+        demand(call_step(craft, k * 0.05, 0.05) == CALL_OK, "step");
 }
 
 static void *drive(void *unused)
 {
     static const size_t size = sizeof expected[0];
-    fmi2Component *craft = calloc(INSTANCES, sizeof *craft);
+    void **craft = calloc(INSTANCES, sizeof *craft);
     double results[RESULTS];
     (void)unused;
     for (int i = 0; i < INSTANCES; i++)
@@ -93,7 +89,7 @@ int main(void)
 {
     pthread_t threads[THREADS];
     for (int kind = 0; kind < KINDS; kind++) {
-        fmi2Component craft = made(kind);
+        void *craft = made(kind);
         for (int k = 0; k < STEPS; k++)
             step(craft, kind, k);
         finish(craft, expected[kind]);

@@ -3,7 +3,11 @@
 
    On Windows without a C runtime: zig would build one for a minute. */
 
-#include "fmi2FunctionTypes.h"
+#define FUNCTION(name) ((name##TYPE *)function(#name))
+
+static void *function(const char *name);
+
+#include "calls.h"
 #include "variables.h"
 
 #include "runs.h" /* made of what stands in variables.h */
@@ -77,62 +81,34 @@ static void print_line(const char *name, unsigned long long hash)
     print(line, n);
 }
 
-struct functions {
-    fmi2InstantiateTYPE *instantiate;
-    fmi2SetupExperimentTYPE *setup;
-    fmi2EnterInitializationModeTYPE *enter;
-    fmi2ExitInitializationModeTYPE *leave;
-    fmi2SetRealTYPE *set;
-    fmi2SetIntegerTYPE *choose;
-    fmi2DoStepTYPE *step;
-    fmi2GetRealTYPE *get;
-    fmi2FreeInstanceTYPE *release;
-};
-
 /* The hash of one run, or 0 where a call failed. */
-static unsigned long long hash_of_run(const struct functions *f, const struct run *run)
+static unsigned long long hash_of_run(const struct run *run)
 {
-    static const unsigned method = V_INTEGRATOR;
-    static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,     V_POSE_HEADING, V_VELOCITY_X,     V_VELOCITY_Y,
-                                       V_VELOCITY_YAW_RATE,        V_BODY_SURGE,   V_BODY_SWAY,      V_SPEED,
-                                       V_FORCE_X,    V_FORCE_Y,    V_MOMENT,       V_STABILITY_NUMBER};
+    static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,            V_POSE_HEADING, V_VELOCITY_X,     V_VELOCITY_Y,
+                                       V_VELOCITY_YAW_RATE, V_BODY_SURGE, V_BODY_SWAY,    V_SPEED,
+                                       V_FORCE_X,    V_FORCE_Y,           V_MOMENT,       V_STABILITY_NUMBER};
     enum { OUTPUTS = sizeof outputs / sizeof *outputs };
     double values[OUTPUTS];
     unsigned long long hash = 0xcbf29ce484222325ULL;
-    fmi2Component craft = f->instantiate("craft", fmi2CoSimulation, GUID, "", NULL, fmi2False, fmi2False);
-    if (!craft || f->set(craft, run->references, run->starts, run->values) != fmi2OK ||
-        f->choose(craft, &method, 1, &run->method) != fmi2OK ||
-        f->setup(craft, fmi2False, 0.0, 0.0, fmi2False, 0.0) != fmi2OK || f->enter(craft) != fmi2OK ||
-        f->leave(craft) != fmi2OK)
+    void *craft = call_instantiate(CALL_STEPS, GUID, "");
+    if (!craft || call_set(craft, run->references, run->starts, run->values) != CALL_OK ||
+        call_choose(craft, V_INTEGRATOR, run->method) != CALL_OK || call_start(craft) != CALL_OK)
         return 0;
     for (unsigned i = 0; i < run->steps; i++) {
         const double *row = run->rows[i]; /* time, step, controls */
-        if (f->set(craft, INPUTS, INPUT_COUNT, row + 2) != fmi2OK || f->step(craft, row[0], row[1], fmi2True) > fmi2Warning ||
-            f->get(craft, outputs, OUTPUTS, values) != fmi2OK)
+        if (call_set(craft, INPUTS, INPUT_COUNT, row + 2) != CALL_OK ||
+            call_step(craft, row[0], row[1]) > CALL_WARNED || call_get(craft, outputs, OUTPUTS, values) != CALL_OK)
             return 0;
         hash = hash_of(hash, values, OUTPUTS);
     }
-    f->release(craft);
+    call_free(craft);
     return hash;
 }
 
 static int all_runs(void)
 {
-    const struct functions f = {
-        (fmi2InstantiateTYPE *)function("fmi2Instantiate"),
-        (fmi2SetupExperimentTYPE *)function("fmi2SetupExperiment"),
-        (fmi2EnterInitializationModeTYPE *)function("fmi2EnterInitializationMode"),
-        (fmi2ExitInitializationModeTYPE *)function("fmi2ExitInitializationMode"),
-        (fmi2SetRealTYPE *)function("fmi2SetReal"),
-        (fmi2SetIntegerTYPE *)function("fmi2SetInteger"),
-        (fmi2DoStepTYPE *)function("fmi2DoStep"),
-        (fmi2GetRealTYPE *)function("fmi2GetReal"),
-        (fmi2FreeInstanceTYPE *)function("fmi2FreeInstance"),
-    };
-    if (!f.instantiate || !f.release)
-        return 2;
     for (unsigned i = 0; i < sizeof RUNS / sizeof *RUNS; i++) {
-        const unsigned long long hash = hash_of_run(&f, &RUNS[i]);
+        const unsigned long long hash = hash_of_run(&RUNS[i]);
         if (!hash)
             return 3;
         print_line(RUNS[i].name, hash);
