@@ -64,6 +64,8 @@ FMI_3_NAMES = {
 }
 FMI_3_WORDS = {
     "fmi2SetupExperiment": "fmi3EnterInitializationMode",
+    "fmi2NewDiscreteStates": "fmi3UpdateDiscreteStates",
+    "fmi2GetDerivatives": "fmi3GetContinuousStateDerivatives",
     "FMUstate: ": "FMUState: ",
     "fmi2": "fmi3",
     "type Real": "type Float64",

@@ -43,7 +43,8 @@ from hovercraft_fmu.simulation import SimulationError, plan, read_description
 from hovercraft_fmu.trade.model_exchange import SMOOTH, TOLERANCES, Calls, solved
 from hovercraft_fmu.trade.reference import reference_end
 from hovercraft_fmu.trade.work_precision import STOP_TIME
-from tests.lowlevel import CONTINUOUS, count, everything, get, one, put, reference, start
+from tests.conftest import FMI_2
+from tests.lowlevel import CONTINUOUS, Instance3, count, everything, get, one, put, reference, start, worded
 from tests.strategies import crafts, numbers
 from tests.test_lifecycle import FAULTS
 
@@ -53,15 +54,15 @@ KNOWNS = (*STATES, *INPUTS)
 
 
 @pytest.fixture(scope="module")
-def shared(native_fmu: Path) -> Iterator[tuple[Any, list[str]]]:
-    with one(native_fmu, exchange=True) as made:
+def shared(each_native_fmu: Path) -> Iterator[tuple[Any, list[str]]]:
+    with one(each_native_fmu, exchange=True) as made:
         yield made
 
 
 @pytest.fixture(scope="module")
-def stepped(native_fmu: Path) -> Iterator[Any]:
+def stepped(each_native_fmu: Path) -> Iterator[Any]:
     """One for co-simulation."""
-    with one(native_fmu) as (made, _):
+    with one(each_native_fmu) as (made, _):
         yield made
 
 
@@ -140,28 +141,32 @@ def test_each_call_has_its_phases(name: str, phase: str, instance: Any, messages
         with pytest.raises(FMICallException) as caught:
             call(instance)
         assert caught.value.status == ERROR
-        assert messages[0].startswith(f"{name} in state '{phase}': must be called in state '")
+        expected = f"{name} in state '{phase}': must be called in state '"
+        assert messages[0].startswith(worded(instance, expected))
         assert everything(instance) == before
 
 
 def in_the_hands_of(host: Any, instance: Any) -> Any:
     """The instance behind fmpy's functions for the other use."""
-    borrowed = copy(host)
+    borrowed = copy(host.made if isinstance(host, Instance3) else host)
     borrowed.component = instance.component
-    return borrowed
+    return Instance3(borrowed) if isinstance(host, Instance3) else borrowed
 
 
-def test_calls_of_the_other_use_are_refused(native_fmu: Path, instance: Any, messages: list[str]) -> None:
-    with one(native_fmu) as (stepping, said):
+def test_calls_of_the_other_use_are_refused(
+    each_native_fmu: Path, standard: int, instance: Any, messages: list[str]
+) -> None:
+    with one(each_native_fmu) as (stepping, said):
         start(stepping)
         go(instance)
         exchanging, stepped = in_the_hands_of(stepping, instance), in_the_hands_of(instance, stepping)
-        of_steps: tuple[tuple[Callable[[], object], str], ...] = (
-            (lambda: exchanging.setRealInputDerivatives([0], [1], [1.0]), "co-simulation"),
+        of_steps: list[tuple[Callable[[], object], str]] = [
             (lambda: exchanging.getRealOutputDerivatives([3], [1]), "co-simulation"),
             (lambda: exchanging.doStep(0.0, 0.1), "'step mode'"),
-        )
-        of_exchange: tuple[tuple[Callable[[], object], str], ...] = (
+        ]
+        if standard == 2:
+            of_steps.append((lambda: exchanging.setRealInputDerivatives([0], [1], [1.0]), "co-simulation"))
+        of_exchange: list[tuple[Callable[[], object], str]] = [
             (lambda: get_vector(stepped.getDerivatives), "model exchange"),
             (lambda: get_vector(stepped.getContinuousStates), "model exchange"),
             (lambda: get_vector(stepped.getNominalsOfContinuousStates), "model exchange"),
@@ -169,7 +174,7 @@ def test_calls_of_the_other_use_are_refused(native_fmu: Path, instance: Any, mes
             (lambda: put_states(stepped, [0.0] * 6), "'continuous-time mode'"),
             (lambda: stepped.setTime(1.0), "'event mode' or 'continuous-time mode'"),
             (lambda: stepped.enterEventMode(), "'event mode' or 'continuous-time mode'"),
-        )
+        ]
         for calls, heard in ((of_steps, messages), (of_exchange, said)):
             for call, words in calls:
                 with pytest.raises(FMICallException):
@@ -193,7 +198,8 @@ def test_a_fault_is_loud_and_loses_nothing(name: str, mode: str, instance: Any, 
         fault(instance)
     assert caught.value.status == ERROR
     tunable = name.startswith("tunable") and mode == "continuous-time mode"
-    assert ("must not be set in state" if tunable else message.replace("step mode", mode)) in messages[-1]
+    expected = "must not be set in state" if tunable else worded(instance, message.replace("step mode", mode))
+    assert expected in messages[-1]
     assert everything(instance) == before
 
 
@@ -251,7 +257,7 @@ def test_faults_of_model_exchange(name: str, instance: Any, messages: list[str])
     with pytest.raises(FMICallException) as caught:
         fault(instance)
     assert caught.value.status == ERROR
-    assert message in messages[-1]
+    assert worded(instance, message) in messages[-1]
     assert everything(instance) == before
 
 
@@ -310,7 +316,8 @@ def test_no_completed_step_leads_past_the_stop_time(instance: Any, messages: lis
     get_vector(instance.getDerivatives)
     with pytest.raises(FMICallException):
         instance.completedIntegratorStep()
-    assert messages == ["fmi2CompletedIntegratorStep at 1.5 s: must not lead past stopTime = 1.0 s"]
+    message = "fmi2CompletedIntegratorStep at 1.5 s: must not lead past stopTime = 1.0 s"
+    assert messages == [worded(instance, message)]
     instance.setTime(1.0)
     assert instance.completedIntegratorStep() == (False, False)
 
@@ -623,25 +630,27 @@ def test_the_side_that_is_taken_at_a_kink(instance: Any) -> None:
     assert partial(instance, "acceleration.x", "thrust") == 0.0
 
 
-def test_a_craft_that_friction_holds_has_no_partial_derivatives(native_fmu: Path) -> None:
-    with one(native_fmu) as (stepping, said):
+def test_a_craft_that_friction_holds_has_no_partial_derivatives(each_native_fmu: Path) -> None:
+    with one(each_native_fmu) as (stepping, said):
         start(stepping, skirt_friction=0.1)
         with pytest.raises(FMICallException):
             partial(stepping, "acceleration.x", "thrust")
-        assert said == [
+        message = (
             "fmi2GetDirectionalDerivative: the craft is at rest on ground that rubs: it must slide to have partial "
             "derivatives"
-        ]
+        )
+        assert said == [worded(stepping, message)]
 
 
 # ---- the description
 
 
 @pytest.fixture(scope="module")
-def description(native_fmu: Path) -> Any:
-    return read_description(native_fmu)
+def description(each_native_fmu: Path) -> Any:
+    return read_description(each_native_fmu)
 
 
+@FMI_2
 def test_the_model_structure(description: Any) -> None:
     assert [unknown.variable.name for unknown in description.derivatives] == list(DERIVATIVES)
     assert [unknown.variable.derivative.name for unknown in description.derivatives] == list(STATES)
@@ -686,6 +695,7 @@ def test_fmpy_takes_co_simulation_unless_asked(native_fmu: Path) -> None:
     assert solved["pose.x"][-1] == pytest.approx(stepped["pose.x"][-1], abs=1e-4)
 
 
+@FMI_2
 @pytest.mark.once
 @pytest.mark.parametrize("scene", SMOOTH, ids=lambda scene: scene.name)
 def test_cvode_meets_the_reference_and_its_error_follows_the_tolerance(
@@ -728,6 +738,7 @@ def test_fmpy_alone_holds_ramps_over_an_output_interval(native_fmu: Path) -> Non
     assert math.log10(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
 
 
+@FMI_2
 def test_what_the_fmu_says_to_the_solver_is_told(shared: tuple[Any, list[str]]) -> None:
     """CVode is C: an exception of fmpy's does not come through it."""
     scene = replace(SCENES["launch"], rows=held(STOP_TIME, (0.0, 99.0, 0.0, 0.0)))

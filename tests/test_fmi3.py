@@ -112,10 +112,8 @@ def test_a_step_tells_where_it_ended_and_that_there_was_no_event(instance: Any) 
     outputs = c_bool(True), c_bool(True), c_bool(True), c_double(7.0)
     arguments = c_void_p(instance.component), c_double(9.0), c_double(0.1), c_bool(True)
     step = _function(instance, "fmi3DoStep")
-    refused = step(
-        c_void_p(instance.component), c_double(9.0), c_double(0.1), c_bool(True), *(byref(each) for each in arguments)
-    )
-    assert (refused, [each.value for each in arguments]) == (ERROR, [False, False, False, 0.25])
+    refused = step(*arguments, *(byref(each) for each in outputs))
+    assert (refused, [each.value for each in outputs]) == (ERROR, [False, False, False, 0.25])
 
 
 BAD_LISTS: dict[str, tuple[Callable[[Any], object], str]] = {
