@@ -1,4 +1,4 @@
-"""python -m tests.fuzz [SECONDS]: any sequence of FMI calls on the sanitized native FMU, ten minutes by default."""
+"""python -m tests.fuzz [SECONDS]: any sequence of FMI calls on the sanitized native FMUs, ten minutes each by default."""
 
 import shutil
 import subprocess
@@ -6,8 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from hovercraft_fmu.fmu.description import NATIVE
-from tests.native import C_TESTS, written_sources
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
+from tests.native import C_INCLUDES, C_TESTS, written_sources
 
 SANITIZE = ("-g", "-O1", "-fsanitize=fuzzer,address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 DEFAULT = 600
@@ -19,12 +19,13 @@ def missing() -> str:
     return "" if shutil.which("clang") and sys.platform == "linux" else "no clang: apt-get install clang"
 
 
-def fuzz(folder: Path, seconds: int) -> str:
+def fuzz(folder: Path, seconds: int, flavour: Flavour = NATIVE) -> str:
     """Run for so long in a folder; libFuzzer's report. Raises AssertionError with it where there is a finding."""
-    written_sources(folder)
-    sources = [folder / name for name in NATIVE.sources]
-    command = ["clang", "-std=c11", "-Wall", "-Wextra", "-ffp-contract=off", *SANITIZE, "-I", str(folder),
-               *map(str, sources), str(C_TESTS / "fuzz.c"), "-lm", "-o", str(folder / "fuzz")]  # fmt: skip
+    written_sources(folder, flavour)
+    sources = [folder / name for name in flavour.sources]
+    command = ["clang", "-std=c11", "-Wall", "-Wextra", "-ffp-contract=off", *SANITIZE, f"-DFMI={flavour.fmi}", "-I",
+               str(folder), *C_INCLUDES, *map(str, sources), str(C_TESTS / "fuzz.c"), "-lm", "-o",
+               str(folder / "fuzz")]  # fmt: skip
     built = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (built.returncode, built.stderr) == (0, "")
     run = [str(folder / "fuzz"), f"-max_total_time={seconds}", "-max_len=4000", "-timeout=30", "-seed=1",
@@ -37,5 +38,6 @@ def fuzz(folder: Path, seconds: int) -> str:
 if __name__ == "__main__":
     if missing():
         sys.exit(missing())
-    with tempfile.TemporaryDirectory() as place:
-        print(fuzz(Path(place), int(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT))
+    for each in (NATIVE, NATIVE3):
+        with tempfile.TemporaryDirectory() as place:
+            print(fuzz(Path(place), int(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT, each))

@@ -1,20 +1,22 @@
-"""Any sequence of FMI calls with any arguments, 20 s; `python -m tests.fuzz` takes ten minutes."""
+"""Any sequence of FMI calls with any arguments, 15 s a standard; `python -m tests.fuzz` takes ten minutes for each."""
 
 import re
 from pathlib import Path
 
 import pytest
 
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from tests import fuzz
 from tests.native import written_sources
 
 pytestmark = pytest.mark.once
 
 
-def test_twenty_seconds_without_a_finding(tmp_path: Path) -> None:
+@pytest.mark.parametrize("flavour", [NATIVE, NATIVE3], ids=lambda flavour: flavour.identifier)
+def test_fifteen_seconds_without_a_finding(flavour: Flavour, tmp_path: Path) -> None:
     if missing := fuzz.missing():
         pytest.skip(missing)
-    report = fuzz.fuzz(tmp_path, 20)
+    report = fuzz.fuzz(tmp_path, 15, flavour)
     done = re.search(r"number_of_executed_units: (\d+)", report)
     assert done
     assert int(done[1]) > 10_000
@@ -44,8 +46,8 @@ def test_it_would_find_a_refused_call_that_changes_something(
         pytest.skip(missing)
     whole = written_sources
 
-    def spoiled(folder: Path) -> Path:
-        path = whole(folder) / file
+    def spoiled(folder: Path, flavour: Flavour) -> Path:
+        path = whole(folder, flavour) / file
         text = path.read_text(encoding="utf-8")
         check, early = SPOILED[file]
         assert text.count(check) == 1

@@ -94,6 +94,32 @@ static inline int call_get_rates(void *craft, double *rates, size_t n)
     return FUNCTION(fmi3GetContinuousStateDerivatives)(craft, rates, n);
 }
 
+static inline int call_go_to_events(void *craft)
+{
+    return FUNCTION(fmi3EnterEventMode)(craft);
+}
+
+static inline int call_get_nominals(void *craft, double *nominals, size_t n)
+{
+    return FUNCTION(fmi3GetNominalsOfContinuousStates)(craft, nominals, n);
+}
+
+static inline int call_get_indicators(void *craft, double *indicators, size_t n)
+{
+    return FUNCTION(fmi3GetEventIndicators)(craft, indicators, n);
+}
+
+static inline int call_reset(void *craft)
+{
+    return FUNCTION(fmi3Reset)(craft);
+}
+
+/* Out of the initialization mode. */
+static inline int call_go(void *craft)
+{
+    return FUNCTION(fmi3ExitInitializationMode)(craft);
+}
+
 static inline int call_terminate(void *craft)
 {
     return FUNCTION(fmi3Terminate)(craft);
@@ -204,6 +230,32 @@ static inline int call_set_states(void *craft, const double *states, size_t n)
 static inline int call_get_rates(void *craft, double *rates, size_t n)
 {
     return FUNCTION(fmi2GetDerivatives)(craft, rates, n);
+}
+
+static inline int call_go_to_events(void *craft)
+{
+    return FUNCTION(fmi2EnterEventMode)(craft);
+}
+
+static inline int call_get_nominals(void *craft, double *nominals, size_t n)
+{
+    return FUNCTION(fmi2GetNominalsOfContinuousStates)(craft, nominals, n);
+}
+
+static inline int call_get_indicators(void *craft, double *indicators, size_t n)
+{
+    return FUNCTION(fmi2GetEventIndicators)(craft, indicators, n);
+}
+
+static inline int call_reset(void *craft)
+{
+    return FUNCTION(fmi2Reset)(craft);
+}
+
+/* Out of the initialization mode. */
+static inline int call_go(void *craft)
+{
+    return FUNCTION(fmi2ExitInitializationMode)(craft);
 }
 
 static inline int call_terminate(void *craft)
