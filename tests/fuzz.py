@@ -1,4 +1,4 @@
-"""python -m tests.fuzz [SECONDS]: any sequence of FMI calls on the sanitized native FMUs, ten minutes each by default."""
+"""python -m tests.fuzz [SECONDS]: any sequence of FMI calls on sanitized native FMUs, by default ten minutes each."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""What FMI 2.0.4 lets an FMU carry of FMI 3.0: a build description for its sources, terminals and an icon."""
+"""FMI 3.0's build description for the sources, terminals and icon; FMI 2.0.4 lets an FMU carry them, too."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -9,9 +9,9 @@ from .interface import INPUTS, STATES
 
 TERMINALS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "controls": INPUTS,
-        "pose": tuple(name for name in STATES if name.startswith("pose.")),
-        "velocity": tuple(name for name in STATES if name.startswith("velocity.")),
+        "actuators": tuple(name for name in INPUTS if not name.startswith("wind.")),
+        "wind": tuple(name for name in INPUTS if name.startswith("wind.")),
+        "motion": STATES,
     }
 )
 """Variables that belong together: what a host may connect at once."""
@@ -46,6 +46,6 @@ def terminals_and_icons() -> Element:
     for terminal, names in TERMINALS.items():
         node = SubElement(parent, "Terminal", {"name": terminal, "matchingRule": "plug"})
         for name in names:
-            member = {"variableName": name, "memberName": name.rpartition(".")[2], "variableKind": "signal"}
+            member = {"variableName": name, "memberName": name, "variableKind": "signal"}
             SubElement(node, "TerminalMemberVariable", member)
     return root
