@@ -240,13 +240,15 @@ def benchmark() -> None:
 def trade(quick: bool, output: Path) -> None:
     """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes.
 
-    And what a solver of the host's costs beside the methods of the native FMU.
+    And what a solver of the host's costs beside the methods of the native FMU, and what a fleet as arrays could
+    save.
     """
-    from .trade import model_exchange, native_costs, work_precision
+    from .trade import fleet_costs, model_exchange, native_costs, work_precision
 
     _measure(lambda folder, tell: work_precision.run(folder, quick, tell), output)
     OUTPUT.print(model_exchange.run(output, quick))
     OUTPUT.print(native_costs.run(output))
+    OUTPUT.print(fleet_costs.run(output))
 
 
 @commands.command()

@@ -14,7 +14,7 @@ from hovercraft_fmu.fmu.native_package import has_compiler
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.scenes import SCENES, Scene
 from hovercraft_fmu.simulation import schedule
-from hovercraft_fmu.trade import model_exchange, native_costs
+from hovercraft_fmu.trade import fleet_costs, model_exchange, native_costs
 from hovercraft_fmu.trade.reference import reference_end
 from hovercraft_fmu.trade.rows import Setting
 from hovercraft_fmu.trade.work_precision import (
@@ -101,6 +101,10 @@ def test_the_command(tmp_path: Path) -> None:
         assert {f"{method.name}: a sub-step" for method in INTEGRATORS} <= {row["what"] for row in costs}
         plain = [row["what"] for row in costs if row["compared_with"].startswith("plain C loop")]
         assert plain == ["semi_implicit_euler: a sub-step", "adaptive: a sub-step"]
+    if not fleet_costs.missing():
+        costs, before = (records(folder / "fleet.csv") for folder in (tmp_path, RESULTS))
+        assert [(row["step"], row["machine"]) for row in costs] == [(row["step"], row["machine"]) for row in before]
+        assert all(float(row["instances"]) > 0.0 < float(row["fleet"]) for row in costs)
     if has_compiler():
         chosen, runs, before = (
             records(folder / name)
