@@ -1,6 +1,6 @@
 /* One craft behind an interface for co-simulation or model exchange: variables, life cycle, faults, warnings, state. It
-   knows no standard: a face (fmi2.c, fmi3.c) translates. What it is given it checks, once; a refused call
-   changes nothing. */
+   knows no standard: a face (fmi2.c, fmi3.c) translates. What it is given it checks, once; a refused call changes
+   nothing. */
 
 #ifndef HOVERCRAFT_INSTANCE_H
 #define HOVERCRAFT_INSTANCE_H
