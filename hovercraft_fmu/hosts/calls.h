@@ -1,5 +1,5 @@
-/* What a host in C calls, by one set of names for both standards: FMI 2.0 or, with -DFMI=3, FMI 3.0. What they return is
-   a status, the same numbers in both. FUNCTION(name) may be defined as the place of a function in a library that was
+/* What a host in C calls, by one set of names for both standards: FMI 2.0 or, with -DFMI=3, FMI 3.0. What they return
+   is a status, the same numbers in both. FUNCTION(name) may be defined as the place of a function in a library that was
    loaded; else it is the linker's. */
 
 #ifndef HOVERCRAFT_CALLS_H

@@ -18,8 +18,9 @@
 
 enum { FLEET = 1000, LANES = 8, GROUPS = FLEET / LANES, SAMPLES = 21, OUTPUT_COUNT = 9 };
 static const double STEP_SIZE = 0.001; /* s */
-static const unsigned OUTPUTS[OUTPUT_COUNT] = {V_POSE_X,     V_POSE_Y,            V_POSE_HEADING, V_VELOCITY_X, V_VELOCITY_Y,
-                                               V_VELOCITY_YAW_RATE, V_BODY_SURGE, V_BODY_SWAY,    V_SPEED};
+static const unsigned OUTPUTS[OUTPUT_COUNT] = {V_POSE_X,     V_POSE_Y,     V_POSE_HEADING,
+                                               V_VELOCITY_X, V_VELOCITY_Y, V_VELOCITY_YAW_RATE,
+                                               V_BODY_SURGE, V_BODY_SWAY,  V_SPEED};
 
 struct lanes {
     double x[LANES], y[LANES], heading[LANES], vx[LANES], vy[LANES], yaw_rate[LANES];
@@ -174,7 +175,8 @@ static void demand_same(void)
 {
     for (int i = 0; i < FLEET; i++)
         for (int k = 0; k < OUTPUT_COUNT; k++)
-            demand(memcmp(&outputs[k][i], &results[i][k], sizeof(double)) == 0, "a fleet that ends where the instances do");
+            demand(memcmp(&outputs[k][i], &results[i][k], sizeof(double)) == 0,
+                   "a fleet that ends where the instances do");
 }
 
 static void start(const struct craft *kind)

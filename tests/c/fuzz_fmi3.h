@@ -18,8 +18,8 @@ static void *made(struct bytes *bytes)
         return fmi3InstantiateModelExchange(name, token, NULL, false, logging, NULL, log);
     if (how == 15)
         return fmi3InstantiateScheduledExecution(name, token, NULL, false, logging, NULL, log, NULL, NULL, NULL);
-    return fmi3InstantiateCoSimulation(name, token, NULL, false, logging, how == 23, how & 8, &reference, how == 27, NULL,
-                                       log, NULL);
+    return fmi3InstantiateCoSimulation(name, token, NULL, false, logging, how == 23, how & 8, &reference, how == 27,
+                                       NULL, log, NULL);
 }
 
 static int integer_of(void *craft, unsigned reference)
@@ -85,7 +85,8 @@ static int derivatives(void *craft, struct bytes *bytes, const struct world *wor
         references[i] = a_byte(bytes) & 1 ? a_reference(bytes) % 12 : a_reference(bytes);
         orders[i] = a_byte(bytes) < 240 ? 1 : an_integer(bytes);
     }
-    const int status = fmi3GetOutputDerivatives(craft, references, n, how == 127 ? NULL : orders, values, n + (how > 250));
+    const int *chosen = how == 127 ? NULL : orders;
+    const int status = fmi3GetOutputDerivatives(craft, references, n, chosen, values, n + (how > 250));
     for (size_t i = 0; i < n && status == fmi3OK; i++)
         demand(world->forged || isfinite(values[i]), "a derivative is not finite");
     return status;

@@ -84,9 +84,9 @@ static void print_line(const char *name, unsigned long long hash)
 /* The hash of one run, or 0 where a call failed. */
 static unsigned long long hash_of_run(const struct run *run)
 {
-    static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,            V_POSE_HEADING, V_VELOCITY_X,     V_VELOCITY_Y,
-                                       V_VELOCITY_YAW_RATE, V_BODY_SURGE, V_BODY_SWAY,    V_SPEED,
-                                       V_FORCE_X,    V_FORCE_Y,           V_MOMENT,       V_STABILITY_NUMBER};
+    static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,     V_POSE_HEADING,      V_VELOCITY_X, V_VELOCITY_Y,
+                                       V_VELOCITY_YAW_RATE,        V_BODY_SURGE,        V_BODY_SWAY,  V_SPEED,
+                                       V_FORCE_X,    V_FORCE_Y,    V_MOMENT,            V_STABILITY_NUMBER};
     enum { OUTPUTS = sizeof outputs / sizeof *outputs };
     double values[OUTPUTS];
     unsigned long long hash = 0xcbf29ce484222325ULL;

@@ -79,8 +79,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     (void)name, (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)update;
     if (!c || (!event_mode_used && n_intermediate == 0))
         return c;
-    refuse(c, call, event_mode_used ? "eventModeUsed must be false: hasEventMode is false"
-                                    : "requiredIntermediateVariables must be empty: providesIntermediateUpdate is false");
+    if (event_mode_used)
+        refuse(c, call, "eventModeUsed must be false: hasEventMode is false");
+    else
+        refuse(c, call, "requiredIntermediateVariables must be empty: providesIntermediateUpdate is false");
     memory_release(c);
     return NULL;
 }
