@@ -5,7 +5,7 @@ import itertools
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -371,10 +371,9 @@ class Stepper:
     def start(self, controls: Controls) -> None:
         """Initialize it, at the start time. Raises SimulationError: the FMU refused a start value."""
         with _refusals(self.messages):
-            self._instance.setupExperiment(startTime=self._run.start_time)
             left = dict(self._run.start_values)
             left = self._apply(left, fmpy.simulation.settable_in_instantiated)
-            self._instance.enterInitializationMode()
+            enter_initialization(self._instance, self._run.start_time)
             self._apply(left, fmpy.simulation.settable_in_initialization_mode)
             self._set(controls)
             self._instance.exitInitializationMode()
@@ -397,7 +396,7 @@ class Stepper:
     def read(self, *names: str) -> list[float]:
         """The values of variables of the kind Real. Raises SimulationError: one is no finite number."""
         with _refusals(self.messages):
-            return list(self._instance.getReal([BY_NAME[name].reference for name in names]))
+            return get_reals(self._instance, [BY_NAME[name].reference for name in names])
 
     def _apply(self, values: dict[str, float | int], settable: Callable[[Any], bool]) -> dict[str, float | int]:
         """Set those that can be set now; return the others."""
@@ -407,7 +406,31 @@ class Stepper:
         return left
 
     def _set(self, controls: Controls) -> None:
-        self._instance.setReal([BY_NAME[name].reference for name in INPUTS], controls)
+        set_reals(self._instance, [BY_NAME[name].reference for name in INPUTS], controls)
+
+
+def is_fmi_3(instance: Any) -> bool:
+    """Whether an instance of fmpy's is of FMI 3.0; else it is of FMI 2.0."""
+    return isinstance(instance, (fmi3.FMU3Slave, fmi3.FMU3Model))
+
+
+def enter_initialization(instance: Any, start_time: float = 0.0) -> None:
+    """With the start time [s], which FMI 2.0 has a call of its own for."""
+    if is_fmi_3(instance):
+        instance.enterInitializationMode(startTime=start_time)
+    else:
+        instance.setupExperiment(startTime=start_time)
+        instance.enterInitializationMode()
+
+
+def set_reals(instance: Any, references: Sequence[int], values: Sequence[float]) -> None:
+    """Set variables of the kind Real."""
+    (instance.setFloat64 if is_fmi_3(instance) else instance.setReal)(references, values)
+
+
+def get_reals(instance: Any, references: Sequence[int]) -> list[float]:
+    """The values of variables of the kind Real."""
+    return list((instance.getFloat64 if is_fmi_3(instance) else instance.getReal)(references))
 
 
 @contextmanager

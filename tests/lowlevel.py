@@ -8,7 +8,7 @@ from typing import Any
 from fmpy import fmi2, fmi3
 
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, VARIABLES
-from hovercraft_fmu.simulation import instantiated, read_description
+from hovercraft_fmu.simulation import instantiated, is_fmi_3, read_description
 
 REALS = [v for v in VARIABLES if v.kind == "Real"]
 INTEGERS = [v for v in VARIABLES if v.kind != "Real"]
@@ -128,7 +128,7 @@ def one(fmu: Path, exchange: bool = False) -> Iterator[tuple[Any, list[str]]]:
     """An instance, for co-simulation or model exchange, and the messages that come from it."""
     messages: list[str] = []
     with instantiated(fmu, read_description(fmu), messages, exchange) as (_, instance):
-        yield Instance3(instance) if isinstance(instance, (fmi3.FMU3Slave, fmi3.FMU3Model)) else instance, messages
+        yield Instance3(instance) if is_fmi_3(instance) else instance, messages
 
 
 def another(instance: Any) -> Any:

@@ -128,23 +128,17 @@ def run_fmpy(fmu: Path) -> list[list[float]]:
 
 
 def _driven(fmu: Path, references: Mapping[str, int]) -> list[list[float]]:
-    from ..simulation import instantiated, read_description
+    from ..simulation import enter_initialization, get_reals, instantiated, read_description, set_reals
 
-    description = read_description(fmu)
     inputs, outputs = ([references[name] for name in names] for names in (INPUTS, OUTPUTS))
-    with instantiated(fmu, description, []) as (_, instance):
-        if description.fmiVersion == "2.0":
-            instance.setupExperiment()
-            put, get = instance.setReal, instance.getReal
-        else:
-            put, get = instance.setFloat64, instance.getFloat64
-        instance.enterInitializationMode()
+    with instantiated(fmu, read_description(fmu), []) as (_, instance):
+        enter_initialization(instance)
         instance.exitInitializationMode()
         rows = []
         for k, controls in enumerate(CONTROLS):
-            put(inputs, controls)
+            set_reals(instance, inputs, controls)
             instance.doStep(k * COMMUNICATION_STEP, COMMUNICATION_STEP)
-            rows.append(list(get(outputs)))
+            rows.append(get_reals(instance, outputs))
         return rows
 
 
