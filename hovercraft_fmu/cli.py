@@ -5,13 +5,24 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import click
 import numpy as np
 from rich.console import Console, Group
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
+from rich.text import Text
 
 from ._version import __version__
 from .fmu.native_package import build_native_fmu, has_compiler
@@ -261,6 +272,48 @@ def scene_terms(output: Path) -> None:
     _measure(study.run, output)
 
 
+@commands.command("sweep")
+@click.argument("study", required=False)
+@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@click.option("--engine", metavar="NAME", default="fmu", show_default=True,
+              help="fmu, or batch: the bare model, all craft at once (fixed-step integrators).")  # fmt: skip
+@click.option("--workers", type=int, metavar="N", help="Processes on this machine. Default: one a processor.")
+@click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
+@click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Default: build/sweep/ and the study.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the results.")
+@click.option("--benchmark", is_flag=True, help="Measure what a run costs, beside fmpy's own way, and stop (minutes).")
+def sweep_command(
+    study: str | None, fmu: Path | None, output: Path | None, plot: Path | None, benchmark: bool, **options: Any
+) -> None:
+    """Make many runs of one FMU, in parallel, into Parquet files.
+
+    STUDY is a TOML file, or the name of a study of the package: turning_circle. FMU is the file; without it
+    build/Hovercraft.fmu, which is built if it is not there. (The native FMU is ten times as fast.) A sweep that was
+    ended goes on where it was with the same command.
+    """
+    from .sweep import read_study, sweep
+
+    if benchmark:
+        from .sweep.benchmark import run
+
+        return _measure(run, output or Path("build") / "sweep_benchmark")
+    if study is None:
+        raise click.UsageError("STUDY: must be given")
+    chosen = read_study(study)
+    begun = perf_counter()
+    with _progress(chosen.runs, "sweeping", MofNCompleteColumn(), _Rate()) as tell:
+        outcome = sweep(chosen, fmu, output=output, tell=tell, **options)
+    seconds = perf_counter() - begun
+    OUTPUT.print(f"{outcome.folder}: {outcome.runs} runs, {outcome.new} of them made now in {seconds:.1f} s")
+    if outcome.error:
+        OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}", markup=False)
+    if plot:
+        from .sweep.plots import plot_sweep
+
+        OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
+    return None
+
+
 @commands.command("cross-check")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def cross_check_command(folder: Path) -> None:
@@ -290,10 +343,17 @@ def _settings(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
     return settings
 
 
+class _Rate(ProgressColumn):
+    """Runs a second."""
+
+    def render(self, task: Task) -> Text:
+        return Text(f"{task.speed:.3g} runs/s" if task.speed else "")
+
+
 @contextmanager
-def _progress(total: float, doing: str = "simulating") -> Iterator[Callable[[float], None]]:
+def _progress(total: float, doing: str = "simulating", *more: ProgressColumn) -> Iterator[Callable[[float], None]]:
     """A bar with the time left, on a terminal; it goes away when the run has ended."""
-    columns = (TextColumn(doing), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    columns = (TextColumn(doing), BarColumn(), TaskProgressColumn(), *more, TimeRemainingColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("", total=total)

@@ -526,7 +526,7 @@ def run_model(run: Run) -> Result:
         ValueError, NonFiniteError: as the model does.
     """
     craft, settings, state = run.craft, run.settings, run.start
-    controls = _controls(run, run.start_time, after_event=False)
+    controls = controls_at(run, run.start_time, after_event=False)
     count, stability, rotation, proposed = 0, 0.0, 0.0, 0.0
 
     def row(time: float) -> tuple[float, ...]:
@@ -545,7 +545,8 @@ def run_model(run: Run) -> Result:
     return Result(np.array(rows, dtype=[*((name, np.float64) for name in names), ("substeps", np.int32)]), run)
 
 
-def _controls(run: Run, time: float, after_event: bool) -> Controls:
+def controls_at(run: Run, time: float, after_event: bool) -> Controls:
+    """The inputs at a time [s], as fmpy's master interpolates them; at a jump, those before it or after it."""
     times = run.signals["time"]
     table = np.stack([run.signals[name] for name in INPUTS])
     values, _ = fmpy.simulation.Input.interpolate(time, times, table, after_event=after_event)
@@ -555,7 +556,7 @@ def _controls(run: Run, time: float, after_event: bool) -> Controls:
 def schedule(run: Run) -> Iterator[tuple[float, float, Controls]]:
     """(start, end) [s] of every communication step, and the controls that hold in it, as fmpy's master sets them."""
     for time, end in communication_points(run):
-        yield time, end, _controls(run, time, after_event=True)
+        yield time, end, controls_at(run, time, after_event=True)
 
 
 def communication_points(run: Run) -> Iterator[tuple[float, float]]:

@@ -1,14 +1,14 @@
 """THE table of variables. The XML, the slave, the documentation and the checks of names are made from it."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import sqrt
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
 from ..model.craft import DRAG_AREAS, Craft
-from ..model.dynamics import Controls, State, actuation, body_velocity, loads
+from ..model.dynamics import Controls, Namespace, State, actuation, body_velocity, loads
 from ..model.integrators import INTEGRATORS
 
 Kind: TypeAlias = Literal["Real", "Integer", "Enumeration", "Boolean"]
@@ -304,14 +304,14 @@ ACTION = (
 """In the order of `observe_action`."""
 
 
-def observe_motion(state: State) -> tuple[float, float, float]:
+def observe_motion(state: State, ns: Namespace = math) -> tuple[float, float, float]:
     """The calculated variables that follow from the state alone; order of MOTION."""
-    surge, sway = body_velocity(state)
-    return surge, sway, sqrt(state.vx * state.vx + state.vy * state.vy)
+    surge, sway = body_velocity(state, ns)
+    return surge, sway, ns.sqrt(state.vx * state.vx + state.vy * state.vy)
 
 
-def observe_action(state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
+def observe_action(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> tuple[float, ...]:
     """What acts on the craft at a state, with the controls of the step that led to it; order of ACTION."""
-    force_x, force_y, moment = loads(state, controls, craft)
+    force_x, force_y, moment = loads(state, controls, craft, ns)
     acceleration = (force_x / craft.mass, force_y / craft.mass, moment / craft.inertia)
-    return force_x, force_y, moment, *acceleration, *actuation(controls, craft)[:2]
+    return force_x, force_y, moment, *acceleration, *actuation(controls, craft, ns)[:2]
