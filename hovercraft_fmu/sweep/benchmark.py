@@ -2,15 +2,17 @@
 
 import csv
 import json
+import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import fmpy
+import psutil
 from rich.console import Group
 from rich.table import Table
 
@@ -20,7 +22,7 @@ from ..fmu.package import build_fmu
 from ..simulation import plan
 from ..trade.work_precision import machine
 from ..view.tables import markdown
-from .runner import BATCH, FMU, sweep
+from .runner import BATCH, FMU, Tell, sweep
 from .study import read_study
 
 FMPY, PYTHON, NATIVE, BARE = "fmpy alone, native FMU", "sweep, Python FMU", "sweep, native FMU", "sweep, batch"
@@ -47,7 +49,6 @@ CASES = (
     Case(BARE, END, 2, 100000),
 )
 """A run costs the same in fmpy's own way however many there are: a hundred are enough; of the Python FMU, 10 000."""
-QUICK = tuple(case for case in CASES if case.runs == 100 and case.workers == 1)
 
 
 class Measured(NamedTuple):
@@ -61,7 +62,7 @@ class Measured(NamedTuple):
     """With the start of the workers, and the writing."""
     milliseconds_a_run: float
     to_fmpy: float
-    """1: how many times as many runs in the same time as in fmpy's own way."""
+    """1: how many times as many runs in the same time as in the first case, fmpy's own way."""
     peak_memory: float
     """MB, of the process"""
     worker_memory: float
@@ -80,46 +81,54 @@ def content(case: Case) -> dict[str, Any]:
     }
 
 
-def measure(tell: Callable[[float], None], quick: bool = False) -> Iterator[Measured]:
-    """Every case, in a fresh process each; `tell` is called with the part that is done."""
-    cases = QUICK if quick else CASES
-    with tempfile.TemporaryDirectory(prefix="hovercraft_sweep_") as place:
-        folder, base = Path(place), 0.0
-        build_fmu(folder / "Python.fmu")
-        build_native_fmu(folder / "Native.fmu")
-        for i, case in enumerate(cases):
-            command = [sys.executable, "-m", __name__, json.dumps(case), str(folder), str(folder / f"case_{i}")]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            if done.returncode != 0:
-                raise OSError(f"measuring {case} failed: {done.stderr.strip()}")
-            seconds, memory, worker_memory = json.loads(done.stdout)
-            cost = 1e3 * seconds / case.runs
-            base = base or cost  # fmpy's is the first
-            tell((i + 1) / len(cases))
-            yield Measured(*case, seconds, cost, base / cost, memory, worker_memory)
+def measure(
+    cases: Sequence[Case], python: Path, native: Path, tell: Callable[[float], None] = lambda _: None
+) -> list[Measured]:
+    """The cases, in a fresh process each, on these FMUs; `tell` is called with the part that is done.
+
+    Raises:
+        OSError: a case failed; with what it said.
+    """
+    rows: list[Measured] = []
+    for done, case in enumerate(cases, 1):
+        with tempfile.TemporaryDirectory(prefix="hovercraft_sweep_") as output:
+            fmu = native if case.way in (FMPY, NATIVE) else python
+            command = [sys.executable, "-m", __name__, json.dumps(case), str(fmu), output]
+            made = subprocess.run(command, capture_output=True, text=True, check=False)
+        if made.returncode != 0:
+            raise OSError(f"measuring {case} failed: {made.stderr.strip()}")
+        seconds, memory, worker_memory = json.loads(made.stdout)
+        cost = 1e3 * seconds / case.runs
+        first = rows[0].milliseconds_a_run if rows else cost
+        rows.append(Measured(*case, seconds, cost, first / cost, memory, worker_memory))
+        tell(done / len(cases))
+    return rows
 
 
-def run(folder: Path, tell: Callable[[float], None] = lambda _: None, quick: bool = False) -> Group:
+def run(folder: Path, tell: Callable[[float], None] = lambda _: None) -> Group:
     """Measure, write sweep.csv and sweep.md into the folder, and return what is to be printed."""
-    rows = list(measure(tell, quick))
+    with tempfile.TemporaryDirectory(prefix="hovercraft_sweep_") as place:
+        python, native = build_fmu(Path(place) / "Python.fmu"), build_native_fmu(Path(place) / "Native.fmu")
+        rows = measure(CASES, python, native, tell)
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "sweep.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(Measured._fields)
         writer.writerows(rows)
-    (folder / "sweep.md").write_text(markdown(TITLES, map(_cells, rows)) + "\n", encoding="utf-8")
+    (folder / "sweep.md").write_text(markdown(TITLES, map(cells, rows)) + "\n", encoding="utf-8")
     table = Table(box=None, pad_edge=False)
     for title in TITLES:
         table.add_column(title)
     for row in rows:
-        table.add_row(*_cells(row))
+        table.add_row(*cells(row))
     return Group("`turn` for 60 s with RK4 at 0.1 s, a run of a sweep", table, f"\n{machine()}", f"\nwrote {folder}/")
 
 
 TITLES = ("way", "keeps", "workers", "runs", "ms a run", "to fmpy alone", "peak memory", "of a worker")
 
 
-def _cells(row: Measured) -> tuple[str, ...]:
+def cells(row: Measured) -> tuple[str, ...]:
+    """A row of the table, in the order of TITLES."""
     worker = f"{row.worker_memory:.0f} MB" if row.worker_memory else ""
     return (
         row.way, row.keeps, str(row.workers), str(row.runs), f"{row.milliseconds_a_run:.3g}", f"{row.to_fmpy:.3g} x",
@@ -130,14 +139,13 @@ def _cells(row: Measured) -> tuple[str, ...]:
 # ---- in the fresh process
 
 
-def _one(case: Case, folder: Path, output: Path) -> float:
+def _one(case: Case, fmu: Path, output: Path, tell: Tell) -> float:
     """Seconds of the case."""
     if case.way == FMPY:
-        return _fmpy_alone(case, folder / "Native.fmu")
-    engine = BATCH if case.way == BARE else FMU
-    fmu = {PYTHON: folder / "Python.fmu", NATIVE: folder / "Native.fmu"}.get(case.way)
+        return _fmpy_alone(case, fmu)
+    engine, given = (BATCH, None) if case.way == BARE else (FMU, fmu)
     begun = perf_counter()
-    outcome = sweep(content(case), fmu, workers=case.workers, output=output, engine=engine)
+    outcome = sweep(content(case), given, workers=case.workers, output=output, engine=engine, tell=tell)
     seconds = perf_counter() - begun
     assert (outcome.new, outcome.failed) == (case.runs, 0)
     return seconds
@@ -160,23 +168,25 @@ def _fmpy_alone(case: Case, fmu: Path) -> float:
     return perf_counter() - begun
 
 
-def _peaks() -> tuple[float, float]:
-    """MB: the most that this process had in memory, and the most of any of its workers; 0 where nobody tells."""
-    try:
-        import resource
-    except ModuleNotFoundError:  # Windows
-        return 0.0, 0.0
-    size = 1e6 if sys.platform == "darwin" else 1e3
-    own, others = (resource.getrusage(who).ru_maxrss / size for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return own, others
+def _peak(process: int) -> float:
+    """MB: the most that a process had in memory; 0 where the system does not tell. (getrusage counts the parent's.)"""
+    status = Path(f"/proc/{process}/status")
+    lines = status.read_text(encoding="ascii").splitlines() if status.exists() else []
+    return max((float(line.split()[1]) / 1e3 for line in lines if line.startswith("VmHWM:")), default=0.0)
 
 
 def main() -> None:
     """The process of one case: prints its seconds and peaks."""
     case = Case(*json.loads(sys.argv[1]))
-    seconds = _one(case, Path(sys.argv[2]), Path(sys.argv[3]))
-    own, workers = _peaks()
-    print(json.dumps([seconds, own, workers if case.workers > 1 else 0.0]))
+    workers = 0.0
+
+    def tell(_runs: int) -> None:
+        nonlocal workers
+        children = psutil.Process().children(recursive=True)
+        workers = max([workers, *(_peak(child.pid) for child in children)])
+
+    seconds = _one(case, Path(sys.argv[2]), Path(sys.argv[3]), tell)
+    print(json.dumps([seconds, _peak(os.getpid()), workers]))
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 """Makes runs: through the FMU, one instance for all of them, or on the bare model, all craft at once."""
 
+import signal
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -143,7 +144,8 @@ class Driver:
             values = self._shared | {name: column[i] for name, column in columns.items()}
             self._messages.clear()
             try:
-                self._one(values)
+                with _interrupt_afterwards():
+                    self._one(values)
             except Exception as error:  # fmpy raises plain exceptions
                 ran.errors[i] = "; ".join(self._messages) or str(error)
                 if getattr(error, "status", fmi2.fmi2Fatal) != fmi2.fmi2Error:
@@ -199,6 +201,22 @@ class Driver:
         return self._legs[settings]
 
 
+@contextmanager
+def _interrupt_afterwards() -> Iterator[None]:
+    """A Ctrl-C waits for the end of a run: inside a Python FMU it would be the FMU's error, or end the process."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    seen = []
+    before = signal.signal(signal.SIGINT, lambda *_: seen.append(True))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if seen:
+        raise KeyboardInterrupt
+
+
 # ---- on the bare model
 
 
@@ -212,25 +230,49 @@ def run_batch(plan: Plan, samples: Samples) -> Ran:
     """
     ran = empty(plan, len(next(iter(samples.values()))))
     with np.errstate(all="ignore"):  # what leaves the range of numbers is found at the end
-        for settings, group in _groups(plan, samples, ran):
-            _Batch(plan, settings, {name: column[group] for name, column in samples.items()}, group, ran).go()
+        for settings, group in _groups(plan, samples):
+            possible = _possible(plan, samples, group, ran)
+            if len(possible):
+                _batch(plan, settings, {name: column[possible] for name, column in samples.items()}, possible, ran)
     return ran
 
 
-def _groups(plan: Plan, samples: Samples, ran: Ran) -> Iterator[tuple[Settings, NDArray[np.int64]]]:
-    """The runs with the same settings whose craft are possible; the errors of the others are noted."""
-    groups: dict[Settings, list[int]] = {}
-    for i in range(len(ran.errors)):
-        values = {name: column[i].item() for name, column in samples.items()}
-        try:
-            settings = settings_of({name: plan.run.value(name) for name in SETTINGS} | values)
-            _craft(plan.run, values)
-        except ValueError as error:
+def _groups(plan: Plan, samples: Samples) -> Iterator[tuple[Settings, NDArray[np.int64]]]:
+    """The runs with the same settings."""
+    count = len(next(iter(samples.values())))
+    columns = [np.broadcast_to(samples.get(name, plan.run.value(name)), count).tolist() for name in SETTINGS]
+    groups: dict[tuple[float | int, ...], list[int]] = {}
+    for i, key in enumerate(zip(*columns, strict=True)):
+        groups.setdefault(key, []).append(i)
+    for key, group in groups.items():
+        yield settings_of(dict(zip(SETTINGS, key, strict=True))), np.array(group)
+
+
+def _possible(plan: Plan, samples: Samples, group: NDArray[np.int64], ran: Ran) -> NDArray[np.int64]:
+    """Those of the group whose craft can be; the errors of the others are noted."""
+    if _refusal(plan.run, {name: column[group] for name, column in samples.items()}) is None:
+        return group
+    for i in group:
+        ran.errors[i] = _refusal(plan.run, {name: column[i].item() for name, column in samples.items()})
+    return np.array([i for i in group if ran.errors[i] is None], np.int64)
+
+
+def _refusal(run: Run, values: Mapping[str, Any]) -> str | None:
+    """Why there cannot be such a craft, or such craft."""
+    try:
+        _craft(run, values)
+    except ValueError as error:
+        return str(error)
+    return None
+
+
+def _batch(plan: Plan, settings: Settings, samples: Samples, group: NDArray[np.int64], ran: Ran) -> None:
+    try:
+        _Batch(plan, settings, samples, group, ran).go()
+    except ValueError as error:  # a sub-step that cannot be, which they share
+        ran.record[group] = np.nan
+        for i in group:
             ran.errors[i] = str(error)
-        else:
-            groups.setdefault(settings, []).append(i)
-    for settings, group in groups.items():
-        yield settings, np.array(group)
 
 
 def _craft(run: Run, values: Mapping[str, Any]) -> Craft:

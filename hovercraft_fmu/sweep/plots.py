@@ -44,8 +44,7 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
     runs = load(folder)
     about = json.loads(runs.schema.metadata[KEY])
     study = json.loads(about["study"])
-    names = runs.column_names
-    swept, kept = names[1 : 1 + about["swept"]], names[1 + about["swept"] : -2]
+    swept, kept = about["swept"], about["kept"]
     table = {name: _shown(runs, name) for name in (*swept, *kept)}
     if {"pose.x", "pose.y"} <= set(study["keep"].get("trajectory", {}).get("of", ())):
         figure = _paths(load(folder, TRAJECTORIES), table, swept[0])
@@ -57,7 +56,7 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
         way = _heat_map if study.get("sampling", {}).get("method", GRID) == GRID else _cloud
         figure = _panels(table, [(name, tuple(swept)) for name in kept], 2, way)
     failed = runs.num_rows - runs["error"].null_count
-    figure.suptitle(f"{study.get('scene', 'inputs')}: {runs.num_rows} runs" + (f", {failed} failed" if failed else ""))
+    figure.suptitle(f"{about['name']}: {runs.num_rows} runs" + (f", {failed} failed" if failed else ""))
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, format="png", metadata={"Software": None})
     return path
@@ -78,8 +77,12 @@ def _label(name: str) -> str:
 
 
 def _panels(
-    table: dict[str, NDArray[np.float64]], panels: list[tuple[str, tuple[str, ...]]], most: int, draw: Any
-) -> Any:
+    table: Mapping[str, NDArray[np.float64]],
+    panels: Sequence[tuple[str, tuple[str, ...]]],
+    most: int,
+    draw: Callable[..., None],
+) -> "Figure":
+    """A panel for each: the column and the parameters that it is drawn over; at most so many in a line."""
     columns = min(most, len(panels))
     lines = -(-len(panels) // columns)
     size = (PANEL[0] * columns + 0.6, PANEL[1] * lines + 0.5)

@@ -33,12 +33,12 @@ Tell: TypeAlias = Callable[[int], None]
 
 FMU, BATCH = "fmu", "batch"
 ENGINES = (FMU, BATCH)
-MOST_RUNS = {FMU: 500, BATCH: 1000}
+MOST_RUNS = {FMU: 500, BATCH: 2000}
 """In a chunk: what a killed sweep makes anew, at most, for each worker."""
 LEAST_CHUNKS = {FMU: 32, BATCH: 2}
 """So that there is work for some workers."""
-MOST_VALUES = 2**21
-"""That a chunk reads (16 MB): so memory stays bounded where whole trajectories are read."""
+MOST_VALUES = 2**22
+"""That a chunk reads (32 MB): so memory stays bounded where whole trajectories are read."""
 CONNECT = 10
 """s, to reach a scheduler."""
 AHEAD = 2
@@ -162,7 +162,9 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
         "hovercraft_fmu": __version__,
         "runs": study.runs,
         "chunk": max(1, most),
-        "swept": len(swept),
+        "name": study.name,
+        "swept": list(swept),
+        "kept": list(study.keep.columns),
         "versions": {
             "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__,
             "pyarrow": pa.__version__, "dask": metadata.version("dask"),
