@@ -307,6 +307,9 @@ def sweep_command(
     OUTPUT.print(f"{outcome.folder}: {outcome.runs} runs, {outcome.new} of them made now in {seconds:.1f} s")
     if outcome.error:
         OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}", markup=False)
+    if outcome.warned:
+        OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
+    _print_extremes(outcome.folder)
     if plot:
         from .sweep.plots import plot_sweep
 
@@ -406,6 +409,21 @@ def _print_scenes() -> None:
         exact = "yes" if scene.exact else ""
         table.add_row(scene.name, scene.description, scene.preset, f"{scene.stop_time:g} s", exact)
     OUTPUT.print(table)
+
+
+def _print_extremes(folder: Path) -> None:
+    from .sweep.store import extremes
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("column", "least", "of the run with", "greatest", "of the run with"):
+        table.add_column(title)
+    for each in extremes(folder):
+        cells = [each.column]
+        for value, run in ((each.least, each.least_run), (each.greatest, each.greatest_run)):
+            cells += [f"{value:.4g} {each.unit}", ", ".join(f"{name} = {part:.4g}" for name, part in run.items())]
+        table.add_row(*cells)
+    if table.row_count:
+        OUTPUT.print(table)
 
 
 def _print_result(result: Result) -> None:

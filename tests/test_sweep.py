@@ -204,7 +204,7 @@ def test_a_batch_with_friction_comes_to_rest(fmu: Path, tmp_path: Path) -> None:
     """At and near rest the size of a step is decided anew in every step: held to 1e-9 there."""
     study = {
         "scene": "drift_to_rest",
-        "set": {"step_size": 0.02, "integrator": "rk4"},
+        "set": {"step_size": 0.05, "integrator": "rk4"},
         "sweep": {"skirt_friction": [0.0, 0.002, 0.008], "wind.y": [0.0, 0.3]},
         "keep": {"end": ["pose.x", "pose.y", "pose.heading", "speed"], "maximum": ["speed"], "distance": True},
     }
@@ -235,11 +235,12 @@ def test_the_batch_warns_as_the_fmu_does(fmu: Path, tmp_path: Path) -> None:
         sweep={"velocity.x": [0.0, 30.0], "velocity.yaw_rate": [0.0, -9.0], "thrust_max": [7.0, 12.0]},
     )
     sweep(study, fmu, workers=1, output=tmp_path / "fmu")
-    sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
+    outcome = sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
     theirs = load(tmp_path / "fmu")["warnings"].to_pylist()
     assert load(tmp_path / "batch")["warnings"].to_pylist() == theirs
     assert len(set(theirs)) > 3
     assert any(each & STEP_UNSTABLE for each in theirs)
+    assert outcome.warned == sum(each != 0 for each in theirs)
 
 
 def test_adaptive_cannot_go_as_a_batch() -> None:
@@ -478,7 +479,7 @@ sweep(json.loads(sys.argv[1]), sys.argv[2], workers=1, output=sys.argv[3])
 def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> None:
     study = but(
         sweep={"mass": RANGE},
-        sampling={"method": "latin_hypercube", "runs": 160, "seed": 1},
+        sampling={"method": "latin_hypercube", "runs": 96, "seed": 1},
         keep={"distance": True, "trajectory": {"every": 30.0, "of": ["pose.x", "pose.y"]}},
     )
     there = tmp_path / "killed" / "runs"
@@ -492,7 +493,7 @@ def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> 
     made = len(list(there.glob("*.parquet")))
     assert 2 <= made < 32
     kept = {path: path.stat().st_mtime_ns for path in there.glob("*.parquet")}
-    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 160 - 5 * made
+    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 96 - 3 * made
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
     sweep(study, fmu, workers=1, output=tmp_path / "whole")
     for what in ("runs", "trajectories"):
@@ -529,15 +530,13 @@ def test_the_bits_do_not_depend_on_who_makes_the_runs(each_fmu: Path, tmp_path: 
             study, copy, scheduler=address, output=tmp_path / "there", tell=lambda _: copy.unlink(missing_ok=True)
         )
         assert not copy.exists()
-        again = sweep(study, each_fmu, scheduler=address, output=tmp_path / "again")
         with distributed.Client(address, set_as_default=False) as client:
             left = client.run(_drivers)
             assert list(left.values()) == [0, 0]  # every instance was freed
-    assert outcome[1:] == again[1:]
+    assert (outcome.new, outcome.failed) == (6, 4)
     for what in ("runs", "trajectories"):
         here = bits(load(tmp_path / "here", what))
         assert bits(load(tmp_path / "there", what)).equals(here)
-        assert bits(load(tmp_path / "again", what)).equals(here)
 
 
 def _drivers() -> int:
@@ -624,7 +623,10 @@ def test_the_command(tmp_path: Path) -> None:
     assert "3 failed; the first is run 1: thrust_min = 20.0 N: must not be above thrust_max = 10.0 N" in done.stdout
     assert (tmp_path / "masses.png").stat().st_size > 10000
     assert "6 runs, 0 of them made now" in command(tmp_path, "masses.toml", "--workers", "1").stdout
-    assert load(tmp_path / "build" / "sweep" / "masses").num_rows == 6
+    speeds = load(tmp_path / "build" / "sweep" / "masses")["end.speed"].drop_null().to_pylist()
+    assert len(speeds) == 3
+    shown = next(line.split() for line in done.stdout.splitlines() if line.startswith("end.speed"))
+    assert [shown[1], shown[9]] == [f"{min(speeds):.4g}", f"{max(speeds):.4g}"]
 
 
 def test_what_is_wrong_is_one_clear_line(

@@ -10,11 +10,13 @@ from .._version import __version__
 from ..model.craft import DRAG_AREAS, PRESETS
 from ..model.integrators import INTEGRATORS
 from .description import DESCRIPTION
-from .interface import VARIABLES, WARNINGS, Variable
+from .interface import ACTION, MOTION, STATES, VARIABLES, WARNINGS, WATCHED, Variable
 
 FOLDER = Path(__file__).parent / "documentation"
 RESULTS = FOLDER / "results"
 """What `hovercraft-fmu trade` and `hovercraft-fmu stability` wrote, with `--output` there."""
+STUDY = Path(__file__).parent.parent / "sweep" / "studies" / "turning_circle.toml"
+"""The study that the page on sweeps explains."""
 
 
 def pages(native: bool = False) -> dict[str, str]:
@@ -35,6 +37,8 @@ def pages(native: bool = False) -> dict[str, str]:
         "checked": _checked(FOLDER / ("checked_native.md" if native else "checked.md")),
         "measured": _all_measured(),
         "machine": _machine(),
+        "study": STUDY.read_text(encoding="utf-8"),
+        "observed": (*STATES, *MOTION, *ACTION, *WATCHED),
     }
     return {
         template.removesuffix(".jinja"): environment.get_template(template).render(values)

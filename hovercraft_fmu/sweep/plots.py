@@ -10,9 +10,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from ..fmu.interface import UNITS
 from ..view.plots import SEA, new_figure
-from .quantities import unit
+from .quantities import display
 from .store import KEY, TRAJECTORIES, load
 from .study import GRID
 
@@ -65,15 +64,12 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
 def _shown(table: pa.Table, name: str) -> NDArray[np.float64]:
     """A column in its display unit; NaN where there is nothing."""
     values: NDArray[np.float64] = table[name].to_numpy().astype(np.float64)
-    display = UNITS[unit(name)].display if unit(name) else None
-    return values * display[1] if display else values
+    return values * display(name)[1]
 
 
 def _label(name: str) -> str:
-    shown = unit(name)
-    display = UNITS[shown].display if shown else None
-    shown = display[0] if display else shown
-    return f"{name} [{shown}]" if shown not in ("", "1") else name
+    shown = display(name)[0]
+    return f"{name} [{shown}]" if shown else name
 
 
 def _panels(

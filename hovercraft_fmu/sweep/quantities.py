@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fmu.interface import ACTION, BY_NAME, MOTION, STATES, WATCHED
+from ..fmu.interface import ACTION, BY_NAME, MOTION, STATES, UNITS, WATCHED
 
 Record: TypeAlias = NDArray[np.float64]
 """Shape (runs, points, quantities): what was read at the communication points that matter."""
@@ -20,10 +20,9 @@ OBSERVED = (*STATES, *MOTION, *ACTION, *WATCHED)
 
 
 class Derived(NamedTuple):
-    """A quantity that is worked out of what is read."""
+    """A quantity that is worked out of what is read; for what they are see documentation/sweeps.html."""
 
     unit: str
-    description: str
     parts: tuple[str, ...]
     of: Callable[..., Any]
 
@@ -32,13 +31,11 @@ DERIVED: Mapping[str, Derived] = MappingProxyType(
     {
         "drift_angle": Derived(
             "rad",
-            "from the course to the heading, positive to starboard: atan2(-sway, surge)",
             ("body.surge", "body.sway"),
             lambda surge, sway: np.arctan2(-sway, surge),
         ),
         "turning_radius": Derived(
             "m",
-            "of the path of a steady turn: speed / |yaw rate|",
             ("speed", "velocity.yaw_rate"),
             lambda speed, yaw_rate: speed / np.abs(yaw_rate),
         ),
@@ -108,6 +105,13 @@ def unit(quantity: str) -> str:
     if quantity == "time" or quantity.endswith(".time"):
         return "s"
     return unit(quantity.partition(".")[2]) if "." in quantity else ""
+
+
+def display(quantity: str) -> tuple[str, float]:
+    """What is shown to people instead of the unit, and its factor; no unit: of a plain number."""
+    shown = unit(quantity)
+    name, factor = (UNITS[shown].display if shown else None) or (shown, 1.0)
+    return ("" if name == "1" else name), factor
 
 
 def quantity_function(keep: Keep, record: Record) -> Callable[[str], Values]:

@@ -2,8 +2,11 @@
 
 import hashlib
 import itertools
+import logging
 import os
 import platform
+import signal
+import tempfile
 import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -39,6 +42,8 @@ LEAST_CHUNKS = {FMU: 32, BATCH: 2}
 """So that there is work for some workers."""
 MOST_VALUES = 2**22
 """That a chunk reads (32 MB): so memory stays bounded where whole trajectories are read."""
+MOST_SUBSTEPS = 10**6
+"""Of a chunk of runs of the FMU: a second of the Python FMU's."""
 CONNECT = 10
 """s, to reach a scheduler."""
 AHEAD = 2
@@ -54,8 +59,10 @@ class Outcome(NamedTuple):
     """Runs that were made now; the others were there."""
     failed: int
     """Of the new ones: rows with an error."""
+    warned: int
+    """Of the new ones: rows whose column `warnings` is not 0."""
     error: str | None
-    """The first of these errors, with the number of its run."""
+    """The first of the errors, with the number of its run."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +123,7 @@ def sweep(
     chunks = {number: _numbers(number, size, chosen.runs) for number in range(-(-chosen.runs // size))}
     there = sum(len(chunks[number]) for number in done)
     todo = ((number, numbers, chosen.samples(numbers)) for number, numbers in chunks.items() if number not in done)
-    new = failed = 0
+    new = failed = warned = 0
     first: tuple[int, str] | None = None
     tell(there)
     if there < chosen.runs:
@@ -126,9 +133,11 @@ def sweep(
                 new += made.runs.num_rows
                 errors = _errors(made.runs)
                 failed += len(errors)
+                warned += np.count_nonzero(made.runs["warnings"].fill_null(0))
                 first = min([*errors[:1], *([first] if first else [])], default=None)
                 tell(there + new)
-    return Outcome(store.folder, chosen.runs, new, failed, "run {}: {}".format(*first) if first else None)
+    error = "run {}: {}".format(*first) if first else None
+    return Outcome(store.folder, chosen.runs, new, failed, warned, error)
 
 
 def _errors(runs: pa.Table) -> list[tuple[int, str]]:
@@ -153,15 +162,13 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
         content = _content(study, Path(fmu or default_fmu()))
     swept = tuple(factor.name for factor in study.factors)
     plan = Plan(study.run, study.keep, timeline(study.run, study.keep))
-    values = len(plan.timeline.times) * max(1, len(study.keep.read))
-    most = min(MOST_RUNS[engine], -(-study.runs // LEAST_CHUNKS[engine]), MOST_VALUES // values)
     about = {
         "study": study.content,
         "engine": engine,
         "fmu_sha256": hashlib.sha256(content).hexdigest() if content else None,
         "hovercraft_fmu": __version__,
         "runs": study.runs,
-        "chunk": max(1, most),
+        "chunk": _chunk(plan, study.runs, engine),
         "name": study.name,
         "swept": list(swept),
         "kept": list(study.keep.columns),
@@ -172,6 +179,16 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
         "machine": f"{platform.system()} {platform.machine()}",
     }  # fmt: skip
     return Job(uuid.uuid4().hex, __version__, plan, swept, content), about
+
+
+def _chunk(plan: Plan, runs: int, engine: str) -> int:
+    """Runs in a chunk. It follows from the study alone, so that a sweep can go on with other workers."""
+    values = len(plan.timeline.times) * max(1, len(plan.keep.read))
+    most = min(MOST_RUNS[engine], -(-runs // LEAST_CHUNKS[engine]), MOST_VALUES // values)
+    if engine == FMU:
+        substeps = (plan.run.stop_time - plan.run.start_time) / float(plan.run.value("step_size"))
+        most = min(most, int(MOST_SUBSTEPS / substeps))
+    return max(1, most)
 
 
 def _check_batch(study: Study) -> None:
@@ -254,13 +271,26 @@ def _workers(workers: int | None, scheduler: str | None) -> Iterator[Any]:
             yield client
         return
     with (
-        distributed.LocalCluster(
-            n_workers=workers or CPU_COUNT, threads_per_worker=1, processes=True, host="127.0.0.1",
-            dashboard_address=None, memory_limit=None,
-        ) as cluster,
+        # a worker that is ended in the middle of a chunk leaves the FMU's files: they go with this folder
+        tempfile.TemporaryDirectory(prefix="hovercraft_sweep_", ignore_cleanup_errors=True) as folder,
+        _local_cluster(workers or CPU_COUNT, folder) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
-    ):  # fmt: skip
+    ):
         yield client
+
+
+def _local_cluster(workers: int, folder: str) -> Any:
+    """Processes on this machine, which leave a Ctrl-C to this one: what is ignored when a process starts stays so."""
+    here = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if here else None
+    try:
+        return distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
+            memory_limit=None, silence_logs=logging.CRITICAL, local_directory=folder, env={"TMPDIR": folder},
+        )  # fmt: skip
+    finally:
+        if here:
+            signal.signal(signal.SIGINT, before)
 
 
 def _here(job: Job, todo: Todo) -> Iterator[Made]:

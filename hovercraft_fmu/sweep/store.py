@@ -4,12 +4,14 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+
+from .quantities import display
 
 RUNS, TRAJECTORIES = "runs", "trajectories"
 KEY = b"hovercraft_fmu"
@@ -105,6 +107,36 @@ def load(folder: str | os.PathLike[str], what: str = RUNS) -> pa.Table:
             raise ValueError(f"{folder}: the sweep kept no trajectories")
     tables = [pq.read_table(path).replace_schema_metadata(None) for path in files]
     return pa.concat_tables(tables).replace_schema_metadata({KEY: json.dumps(metadata)})
+
+
+class Extreme(NamedTuple):
+    """The least and the greatest of a column, in its display unit, and the runs that they are of."""
+
+    column: str
+    unit: str
+    least: float
+    least_run: dict[str, Any]
+    """Swept parameter -> value"""
+    greatest: float
+    greatest_run: dict[str, Any]
+
+
+def extremes(folder: str | os.PathLike[str]) -> list[Extreme]:
+    """Between what the columns of a finished sweep lie; of those that have a value at all. Raises as `load` does."""
+    runs = load(folder)
+    about = json.loads(runs.schema.metadata[KEY])
+    found = []
+    for name in about["kept"]:
+        values = runs[name].to_numpy()
+        if np.isnan(values).all():
+            continue
+        shown, factor = display(name)
+        places = int(np.nanargmin(values)), int(np.nanargmax(values))
+        (low, low_run), (high, high_run) = (
+            (float(values[i]) * factor, {each: runs[each][i].as_py() for each in about["swept"]}) for i in places
+        )
+        found.append(Extreme(name, shown, low, low_run, high, high_run))
+    return found
 
 
 # ---- tables
