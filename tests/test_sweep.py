@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
@@ -77,7 +78,7 @@ def test_a_run_has_the_bits_of_simulate(scene: str, each_fmu: Path, tmp_path: Pa
     for row in rows(load(tmp_path)):
         settings = {"step_size": 0.01, "mass": row["mass"], "integrator": row["integrator"]}
         alone = simulate(scene, each_fmu, start_values=settings, stop_time=12.0)
-        own = paths.filter(pa.compute.equal(paths["run"], row["run"]))
+        own = paths.filter(pc.equal(paths["run"], row["run"]))
         for name in ("time", *OBSERVED):
             assert np.array_equal(own[name].to_numpy(), alone[name]), (row, name)
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from ..fmu.interface import (
@@ -165,14 +166,17 @@ class Driver:
         rows = iter(self._rows)
         if timeline.start_kept:
             instance.fmi2GetReal(component, self._read_references, read, next(rows))
+        # fmpy's methods look the function up and its result over, in Python: here that would cost what the step costs
+        do_step, get_real, references = instance.dll.fmi2DoStep, instance.dll.fmi2GetReal, self._read_references
         controls = None
-        for leg in self._legs_for(values):
-            if leg.controls != controls:
-                controls = leg.controls
-                self._put(controls, values)
-            instance.fmi2DoStep(component, leg.time, leg.end - leg.time, fmi2.fmi2True)
-            if leg.kept:
-                instance.fmi2GetReal(component, self._read_references, read, next(rows))
+        for time, end, wanted, kept in self._legs_for(values):
+            if wanted is not controls and wanted != controls:
+                self._put(wanted, values)
+            controls = wanted
+            if (status := do_step(component, time, end - time, 1)) > fmi2.fmi2Warning:
+                raise FMICallException("fmi2DoStep", status)
+            if kept and (status := get_real(component, references, read, next(rows))) > fmi2.fmi2Warning:
+                raise FMICallException("fmi2GetReal", status)
         instance.fmi2GetInteger(component, self._warned_reference, 1, self._warned)
 
     def _start(self, instance: Any, values: Mapping[str, float | int]) -> None:

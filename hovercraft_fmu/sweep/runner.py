@@ -133,7 +133,7 @@ def sweep(
                 new += made.runs.num_rows
                 errors = _errors(made.runs)
                 failed += len(errors)
-                warned += np.count_nonzero(made.runs["warnings"].fill_null(0))
+                warned += int(np.count_nonzero(made.runs["warnings"].fill_null(0)))
                 first = min([*errors[:1], *([first] if first else [])], default=None)
                 tell(there + new)
     error = "run {}: {}".format(*first) if first else None
