@@ -35,6 +35,7 @@ from hovercraft_fmu.sweep.plots import plot_sweep
 from hovercraft_fmu.sweep.quantities import DERIVED, OBSERVED
 from hovercraft_fmu.sweep.study import Factor
 from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
+from tests.conftest import ROOT
 
 FIXED_STEP = [method.name for method in INTEGRATORS if method.integrate]
 COARSE = {"integrator": "rk4", "step_size": 0.1}
@@ -557,6 +558,8 @@ def test_a_scheduler_that_is_not_there(fmu: Path, tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(runner_module, "CONNECT", 0.5)
     with pytest.raises(OSError, match=r"127\.0\.0\.1:1"):
         sweep(MASSES, fmu, scheduler="tcp://127.0.0.1:1", output=tmp_path)
+    with pytest.raises(ValueError, match="scheduler = 'nonsense': must be an address as tcp://"):
+        sweep(MASSES, fmu, scheduler="nonsense", output=tmp_path)
 
 
 def test_bad_arguments(tmp_path: Path, fmu: Path) -> None:
@@ -667,6 +670,12 @@ def test_the_benchmark(fmu: Path, native_fmu: Path) -> None:
     assert len(measured) == 4
     assert measured[0].to_fmpy == 1.0
     assert all(row.seconds > 0.0 for row in measured)
+    assert benchmark.short(measured) == measured
+
+
+def test_the_readme_shows_what_is_committed() -> None:
+    table = (ROOT / "hovercraft_fmu" / "fmu" / "documentation" / "results" / "sweep.md").read_text(encoding="utf-8")
+    assert table in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_every_scene_can_be_swept() -> None:

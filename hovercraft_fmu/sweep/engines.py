@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -90,7 +91,7 @@ class Driver:
         self._references = {v.name: v.valueReference for v in self._description.modelVariables}
         self._stack, self._messages = ExitStack(), list[str]()
         self._busy, self._over = threading.Lock(), False
-        self._legs: dict[Settings, list[Leg]] = {}
+        self._merged = lru_cache(maxsize=16)(partial(merged, plan.timeline.legs))
         self._make_arrays()
         self._instantiate()
 
@@ -108,7 +109,7 @@ class Driver:
         self._new = True
 
     def _make_arrays(self) -> None:
-        run, names = self._plan.run, {*self._plan.run.start_values, *self._swept}
+        run, names = self._plan.run, tuple(dict.fromkeys((*self._plan.run.start_values, *self._swept)))
         self._shared = {name: run.value(name) for name in (*names, *SETTINGS)}
         self._real_names = [name for name in names if BY_NAME[name].kind == "Real"]
         self._integer_names = [name for name in names if BY_NAME[name].kind != "Real"]
@@ -169,7 +170,7 @@ class Driver:
         # fmpy's methods look the function up and its result over, in Python: here that would cost what the step costs
         do_step, get_real, references = instance.dll.fmi2DoStep, instance.dll.fmi2GetReal, self._read_references
         controls = None
-        for time, end, wanted, kept in self._legs_for(values):
+        for time, end, wanted, kept in self._merged(settings_of(values)):
             if wanted is not controls and wanted != controls:
                 self._put(wanted, values)
             controls = wanted
@@ -198,12 +199,6 @@ class Driver:
             self._inputs[i] = values[name]
         self._instance.fmi2SetReal(self._instance.component, self._input_references, len(INPUTS), self._inputs)
 
-    def _legs_for(self, values: Mapping[str, float | int]) -> list[Leg]:
-        settings = settings_of(values)
-        if settings not in self._legs:
-            self._legs[settings] = merged(self._plan.timeline.legs, settings)
-        return self._legs[settings]
-
 
 @contextmanager
 def _interrupt_afterwards() -> Iterator[None]:
@@ -217,8 +212,8 @@ def _interrupt_afterwards() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-    if seen:
-        raise KeyboardInterrupt
+        if seen:
+            raise KeyboardInterrupt
 
 
 # ---- on the bare model

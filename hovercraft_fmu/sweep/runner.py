@@ -120,9 +120,10 @@ def sweep(
         raise ValueError(f"workers = {workers}: must be at least 1")
     store = Store(Path(output) if output else Path("build") / "sweep" / chosen.name, about)
     size, done = about["chunk"], store.done
-    chunks = {number: _numbers(number, size, chosen.runs) for number in range(-(-chosen.runs // size))}
-    there = sum(len(chunks[number]) for number in done)
-    todo = ((number, numbers, chosen.samples(numbers)) for number, numbers in chunks.items() if number not in done)
+    chunks = range(-(-chosen.runs // size))
+    there = sum(len(_numbers(number, size, chosen.runs)) for number in done)
+    left = ((number, _numbers(number, size, chosen.runs)) for number in chunks if number not in done)
+    todo = ((number, numbers, chosen.samples(numbers)) for number, numbers in left)
     new = failed = warned = 0
     first: tuple[int, str] | None = None
     tell(there)
@@ -265,7 +266,7 @@ def _workers(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     if scheduler is not None:
         if workers is not None:
             raise ValueError(f"workers = {workers}: must not be given with a scheduler, which has its own")
-        with distributed.Client(scheduler, set_as_default=False, timeout=CONNECT) as client:
+        with _connected(scheduler) as client:
             if not client.nthreads():
                 raise ValueError(f"scheduler = {scheduler!r}: must have a worker")
             yield client
@@ -277,6 +278,13 @@ def _workers(workers: int | None, scheduler: str | None) -> Iterator[Any]:
         distributed.Client(cluster, set_as_default=False) as client,
     ):
         yield client
+
+
+def _connected(scheduler: str) -> Any:
+    try:
+        return distributed.Client(scheduler, set_as_default=False, timeout=CONNECT)
+    except ValueError as error:
+        raise ValueError(f"scheduler = {scheduler!r}: must be an address as tcp://10.0.0.1:8786; {error}") from error
 
 
 def _local_cluster(workers: int, folder: str) -> Any:
