@@ -288,7 +288,7 @@ def sweep_command(
     """Make many runs of one FMU, in parallel, into Parquet files.
 
     STUDY is a TOML file, or the name of a study of the package: turning_circle. FMU is the file; without it
-    build/Hovercraft.fmu, which is built if it is not there. (The native FMU is ten times as fast.) A sweep that was
+    build/Hovercraft.fmu, which is built if it is not there. (The native FMU is many times as fast.) A sweep that was
     ended goes on where it was with the same command.
     """
     from .sweep import read_study, sweep
