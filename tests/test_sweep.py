@@ -1,10 +1,12 @@
 """Sweeps: a run of one has the bits of `simulate`, whoever makes it, when and beside what."""
 
+import contextlib
 import itertools
 import json
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -14,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
@@ -525,8 +528,8 @@ def test_the_bits_do_not_depend_on_who_makes_the_runs(each_fmu: Path, tmp_path: 
     sweep(study, each_fmu, workers=1, output=tmp_path / "here")
     copy = tmp_path / "copy.fmu"
     copy.write_bytes(each_fmu.read_bytes())
-    cluster = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
-    with distributed.LocalCluster(**cluster) as there:
+    cluster = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1"}
+    with distributed.LocalCluster(**cluster, dashboard_address="127.0.0.1:0") as there:
         address = there.scheduler_address
         outcome = sweep(
             study, copy, scheduler=address, output=tmp_path / "there", tell=lambda _: copy.unlink(missing_ok=True)
@@ -552,6 +555,25 @@ def test_two_workers_of_this_machine_give_the_bits_of_one(tmp_path: Path) -> Non
     for workers in (1, 2):
         sweep(study, engine="batch", workers=workers, output=tmp_path / str(workers))
     assert load(tmp_path / "1").equals(load(tmp_path / "2"))
+
+
+@pytest.mark.once
+def test_nothing_listens_to_other_machines(fmu: Path, tmp_path: Path) -> None:
+    """Nor does a port that is taken matter: dask's own is here."""
+    addresses: set[str] = set()
+
+    def look(_: int) -> None:
+        processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+        found = [one.laddr.ip for each in processes for one in each.net_connections() if one.status == "LISTEN"]
+        addresses.update(found)
+
+    with socket.socket() as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with contextlib.suppress(OSError):  # or another program has it
+            taken.bind(("127.0.0.1", 8787))
+            taken.listen()
+        sweep(MASSES, fmu, workers=2, output=tmp_path, tell=look)
+    assert addresses == {"127.0.0.1"}
 
 
 def test_a_scheduler_that_is_not_there(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

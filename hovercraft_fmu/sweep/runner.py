@@ -46,6 +46,8 @@ MOST_SUBSTEPS = 10**6
 """Of a chunk of runs of the FMU: a second of the Python FMU's."""
 CONNECT = 10
 """s, to reach a scheduler."""
+LOOPBACK = "127.0.0.1:0"
+"""Any free port, of this machine alone."""
 AHEAD = 2
 """Chunks a worker that are on their way."""
 
@@ -293,8 +295,10 @@ def _local_cluster(workers: int, folder: str) -> Any:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN) if here else None
     try:
         return distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
-            memory_limit=None, silence_logs=logging.CRITICAL, local_directory=folder, env={"TMPDIR": folder},
+            n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1", memory_limit=None,
+            # dask's pages cannot be switched off, and without an address they are on every network
+            worker_dashboard_address=LOOPBACK, scheduler_kwargs={"dashboard": False, "dashboard_address": LOOPBACK},
+            silence_logs=logging.CRITICAL, local_directory=folder, env={"TMPDIR": folder},
         )  # fmt: skip
     finally:
         if here:
