@@ -1,7 +1,7 @@
 """The table of variables -> modelDescription.xml, for both flavours of the FMU."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from xml.etree.ElementTree import Element, SubElement
 
@@ -56,6 +56,10 @@ class Flavour:
     """The capabilities in model exchange; none where there is no such interface."""
     sources: tuple[str, ...] = ()
     """Files of sources/ to compile."""
+
+    def of(self, model: Model) -> "Flavour":
+        """The same kind of FMU of another model."""
+        return replace(self, model=model, identifier=model.name)
 
 
 PYTHON = Flavour(

@@ -2,7 +2,9 @@
 
 import csv
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import jinja2
 
@@ -21,15 +23,10 @@ STUDY = Path(__file__).parent.parent / "sweep" / "studies" / "turning_circle.tom
 
 def pages(native: bool = False) -> dict[str, str]:
     """Path inside the documentation -> the whole page, for the Python FMU or the native one."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(FOLDER), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
     values = {
         "native": native,
-        "version": __version__,
         "description": DESCRIPTION,
         "variables": VARIABLES,
-        "limits": _limits,
         "warnings": WARNINGS,
         "integrators": INTEGRATORS,
         "presets": PRESETS,
@@ -40,11 +37,20 @@ def pages(native: bool = False) -> dict[str, str]:
         "study": STUDY.read_text(encoding="utf-8"),
         "observed": (*STATES, *MOTION, *ACTION, *WATCHED),
     }
-    return {
-        template.removesuffix(".jinja"): environment.get_template(template).render(values)
-        for template in environment.list_templates(extensions=["jinja"])
-        if template.endswith(".html.jinja")
-    }
+    return rendered(FOLDER, values)
+
+
+def rendered(folder: Path, values: Mapping[str, Any]) -> dict[str, str]:
+    """Path -> page, of the templates NAME.html.jinja in a folder; they may include those in FOLDER."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader((folder, FOLDER)),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    environment.globals.update(version=__version__, limits=_limits)
+    names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.html.jinja"))
+    return {name.removesuffix(".jinja"): environment.get_template(name).render(values) for name in names}
 
 
 def _checked(table: Path) -> list[list[str]]:

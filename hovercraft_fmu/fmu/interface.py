@@ -47,9 +47,11 @@ DEGREES_PER_RADIAN = 57.29577951308232
 UNITS: Mapping[str, Unit] = MappingProxyType(
     {
         "1": Unit("Ratio", "Dimensionless", {}),
+        "1/rad": Unit("PerAngle", "PerAngle", {"rad": -1}),
         "kg": Unit("Mass", "Mass", {"kg": 1}),
         "kg.m2": Unit("MomentOfInertia", "MomentOfInertia", {"kg": 1, "m": 2}),
         "kg/m3": Unit("Density", "Density", {"kg": 1, "m": -3}),
+        "kg/s": Unit("MassFlowRate", "MassFlowRate", {"kg": 1, "s": -1}),
         "m": Unit("Length", "Length", {"m": 1}),
         "m/s": Unit("Velocity", "Velocity", {"m": 1, "s": -1}),
         "m/s2": Unit("Acceleration", "Acceleration", {"m": 1, "s": -2}),
@@ -60,6 +62,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
         "rad/s": Unit("AngularVelocity", "AngularVelocity", {"rad": 1, "s": -1}, ("deg/s", DEGREES_PER_RADIAN)),
         "rad/s2": Unit("AngularAcceleration", "AngularAcceleration", {"rad": 1, "s": -2}),
         "s": Unit("Time", "Time", {"s": 1}),
+        "s/rad": Unit("TimePerAngle", "TimePerAngle", {"s": 1, "rad": -1}),
     }
 )
 
