@@ -25,11 +25,14 @@ from rich.table import Table
 from rich.text import Text
 
 from ._version import __version__
+from .autopilot.package import build_autopilot
+from .coupling import Passage, sail
 from .fmu.native_package import build_native_fmu, has_compiler
 from .fmu.package import build_fmu
 from .model.craft import PRESETS
-from .scenes import CONTROL_LOGS, SCENES
+from .scenes import CONTROL_LOGS, SCENES, VOYAGES
 from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, default_fmu, plan, simulate
+from .ssp import build_ssp
 from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE
 from .view.tables import markdown
@@ -63,6 +66,7 @@ def commands(context: click.Context) -> None:
     \b
     New here?
       hovercraft-fmu demo                          build, check and drive it; see build/demo/
+      hovercraft-fmu demo --loop                   the same with an autopilot at the helm
       hovercraft-fmu build                         write build/Hovercraft.fmu and build/HovercraftNative.fmu
       hovercraft-fmu drive                         the arrow keys, in a window
       hovercraft-fmu simulate --scene turn --plot turn.png
@@ -74,17 +78,29 @@ def commands(context: click.Context) -> None:
 
 @commands.command()
 @click.option("--native", is_flag=True, help="The native FMU alone.")
-def build(native: bool) -> None:
+@click.option("--ssp", is_flag=True, help="Then the autopilot's FMU, and an SSP file of the closed loop with each FMU.")
+def build(native: bool, ssp: bool) -> None:
     """Write build/Hovercraft.fmu and, where its compiler is installed, build/HovercraftNative.fmu.
 
     The compiler of the native FMU: pip install 'hovercraft-fmu[native]'.
     """
+    built = []
     if not native:
-        _print_built(build_fmu(), "Python")
+        built.append(build_fmu())
+        _print_built(built[-1], "Python")
     if native or has_compiler():
-        _print_built(build_native_fmu(), "native")
+        built.append(build_native_fmu())
+        _print_built(built[-1], "native")
     else:
         OUTPUT.print("no native FMU: its compiler is not installed: pip install 'hovercraft-fmu\\[native]'")
+    if ssp:
+        autopilot = build_autopilot()
+        _print_built(autopilot, "Python")
+        for fmu in built:
+            path = build_ssp(fmu.with_name(f"{fmu.stem}Loop.ssp"), fmu, autopilot)
+            OUTPUT.print(
+                f"{path}: {path.stat().st_size / 1000:.0f} kB, SSP 1.0, the loop of {fmu.name} and {autopilot.name}"
+            )
 
 
 def _print_built(path: Path, flavour: str) -> None:
@@ -214,12 +230,12 @@ def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
 
 
 @commands.command()
-def demo() -> None:
+@click.option("--loop", is_flag=True, help="The closed loop: an autopilot FMU takes it round a course in a crosswind.")
+def demo(loop: bool) -> None:
     """Build the FMU, check it, and drive it over a recorded control log; see build/demo/."""
-    fmu = build_fmu()
-    OUTPUT.print(f"built {fmu}")
-    if _validated(fmu):
-        raise click.ClickException("the FMU is not valid")
+    fmu = _built_and_valid(build_fmu())
+    if loop:
+        return _demo_of_the_loop(fmu, _built_and_valid(build_autopilot()))
     result = _simulated(DEMO_LOG, fmu, preset="ice", communication_step=SCENES["ice"].communication_step)
     _print_result(result)
     _write(result, DEMO_FOLDER / "ice.csv", DEMO_FOLDER / "ice.png")
@@ -229,6 +245,25 @@ def demo() -> None:
         "  hovercraft-fmu simulate --scene ice --set mass=200 --plot build/heavy.png\n"
         "  hovercraft-fmu simulate --list-scenes"
     )
+    return None
+
+
+def _built_and_valid(fmu: Path) -> Path:
+    OUTPUT.print(f"built {fmu}")
+    if _validated(fmu):
+        raise click.ClickException("the FMU is not valid")
+    return fmu
+
+
+def _demo_of_the_loop(fmu: Path, autopilot: Path) -> None:
+    voyage = VOYAGES["crosswind"]
+    with _progress(voyage.stop_time) as progress:
+        passage = sail(voyage, fmu, autopilot, progress=progress)
+    _print_passage(passage)
+    OUTPUT.print(f"wrote {passage.write_csv(DEMO_FOLDER / 'loop.csv')}")
+    from .view.plots import plot_passage
+
+    OUTPUT.print(f"wrote {plot_passage(passage, DEMO_FOLDER / 'loop.png')}")
 
 
 @commands.command()
@@ -315,6 +350,15 @@ def sweep_command(
 
         OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
     return None
+
+
+@commands.command()
+@click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "coupling", show_default=True)
+def coupling(output: Path) -> None:
+    """Measure what the communication step of the closed loop costs, for two ways to couple, beside the integrator."""
+    from .trade import coupling as study
+
+    _measure(study.run, output)
 
 
 @commands.command("cross-check")
@@ -426,9 +470,30 @@ def _print_extremes(folder: Path) -> None:
         OUTPUT.print(table)
 
 
+def _print_passage(passage: Passage) -> None:
+    off = np.abs(passage["cross_track_error"])
+    arrived = f"after {passage['time'][-1]:g} s" if passage.arrived else "no"
+    distance = passage.distance
+    _print_rows(
+        f"{passage.voyage.name}: {passage.voyage.description}",
+        {
+            "waypoints reached": f"{int(passage['waypoint'][-1]) - (not passage.arrived)} of {len(passage.waypoints)}",
+            "arrived": arrived,
+            "distance": f"{distance:.2f} m, {distance / passage.craft.length:.1f} craft lengths",
+            "off the legs": f"{off.mean():.2f} m in the mean, {off.max():.2f} m where a leg begins",
+        },
+    )
+
+
+def _print_rows(title: str, rows: dict[str, str]) -> None:
+    table = Table(title=title, title_justify="left", show_header=False, box=None, pad_edge=False)
+    for name, text in rows.items():
+        table.add_row(name, text)
+    OUTPUT.print(table)
+
+
 def _print_result(result: Result) -> None:
     run = result.run
-    table = Table(title=f"{run.title}: {run.method}", title_justify="left", show_header=False, box=None, pad_edge=False)
     rows = {
         "duration": f"{result['time'][-1] - run.start_time:g} s, {len(result['time']) - 1} communication steps",
         "sub-steps": f"{result['substeps'][-1]}",
@@ -440,9 +505,7 @@ def _print_result(result: Result) -> None:
         "end heading": f"{np.degrees(result['pose.heading'][-1]):.2f} deg",
         "end speed": f"{result['speed'][-1]:.4f} m/s",
     }
-    for name, text in rows.items():
-        table.add_row(name, text)
-    OUTPUT.print(table)
+    _print_rows(f"{run.title}: {run.method}", rows)
     for warning in result.warnings:
         OUTPUT.print(f"warning: {warning}", markup=False)
 

@@ -1,6 +1,7 @@
 """The closed loop of hovercraft and autopilot: a small master for two FMUs, or for the bare functions behind them."""
 
 import math
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -19,7 +20,15 @@ from .model.craft import Craft
 from .model.dynamics import Controls, State
 from .model.subcycling import Settings, advance
 from .scenes import Voyage, voyage
-from .simulation import Progress, SimulationError, default_fmu, instantiated, read_description
+from .simulation import (
+    Progress,
+    SimulationError,
+    default_fmu,
+    instantiated,
+    path_length,
+    read_description,
+    write_csv,
+)
 
 JACOBI, GAUSS_SEIDEL = SCHEMES = ("jacobi", "gauss_seidel")
 """Both parts step side by side, with what the other one showed before; or the autopilot steps first, and the craft
@@ -64,6 +73,25 @@ class Passage:
     def craft(self) -> Craft:
         """That sailed."""
         return _craft(self.voyage)
+
+    @property
+    def distance(self) -> float:
+        """m: length of the path from communication point to communication point."""
+        return path_length(self["pose.x"], self["pose.y"])
+
+    def write_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write all columns as CSV, with all digits. Raises OSError where that cannot be done."""
+        return write_csv(self.data, path)
+
+    @property
+    def waypoints(self) -> tuple[tuple[float, float], ...]:
+        """m, world frame: the course."""
+        return DEMO_COURSE
+
+    @property
+    def acceptance_radius(self) -> float:
+        """m: a waypoint this near is reached."""
+        return Gains().acceptance_radius
 
 
 def sail(

@@ -124,14 +124,24 @@ class Result:
     @property
     def distance(self) -> float:
         """m: length of the path from communication point to communication point."""
-        return float(np.hypot(np.diff(self["pose.x"]), np.diff(self["pose.y"])).sum())
+        return path_length(self["pose.x"], self["pose.y"])
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write all columns as CSV, with all digits. Raises OSError where that cannot be done."""
-        path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fmpy.util.write_csv(path, self.data)
-        return path
+        return write_csv(self.data, path)
+
+
+def path_length(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """m: of a polyline."""
+    return float(np.hypot(np.diff(x), np.diff(y)).sum())
+
+
+def write_csv(data: NDArray[np.void], path: str | os.PathLike[str]) -> Path:
+    """Write a structured array as CSV, with all digits; its folder is made."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fmpy.util.write_csv(path, data)
+    return path
 
 
 def simulate(

@@ -135,13 +135,13 @@ def steer(
     if pilot.reached == len(course):
         return pilot, Commands(), Sight(0.0, _distance(motion, course[-1]))
     active = course[pilot.reached]
-    cross_track, wanted = _line_of_sight(pilot.origin, active, motion, gains)
-    force_x, force_y = _force(pilot, motion, wanted, gains)
+    cross_track, wanted = line_of_sight(pilot.origin, active, motion, gains)
+    force_x, force_y = wanted_force(pilot, motion, wanted, gains)
     share = -math.expm1(-duration / gains.integral_time)  # of a lag, over the whole time: stable however long it is
     pilot = pilot._replace(
         push_x=pilot.push_x + share * (force_x - pilot.push_x), push_y=pilot.push_y + share * (force_y - pilot.push_y)
     )
-    commands = _helm((force_x, force_y), wanted, motion, gains)
+    commands = helm((force_x, force_y), wanted, motion, gains)
     return pilot, commands, Sight(cross_track, _distance(motion, active))
 
 
@@ -152,7 +152,7 @@ def _look_ahead(pilot: Pilot, motion: State, course: Sequence[Waypoint], radius:
     return pilot
 
 
-def _line_of_sight(origin: Waypoint, active: Waypoint, motion: State, gains: Gains) -> tuple[float, Waypoint]:
+def line_of_sight(origin: Waypoint, active: Waypoint, motion: State, gains: Gains) -> tuple[float, Waypoint]:
     """The cross-track error [m], and the direction to go: a unit vector."""
     along_x, along_y, length = _unit(active.x - origin.x, active.y - origin.y)
     x, y = motion.x - origin.x, motion.y - origin.y
@@ -162,7 +162,7 @@ def _line_of_sight(origin: Waypoint, active: Waypoint, motion: State, gains: Gai
     return cross_track, Waypoint(to_x, to_y)
 
 
-def _force(pilot: Pilot, motion: State, wanted: Waypoint, gains: Gains) -> tuple[float, float]:
+def wanted_force(pilot: Pilot, motion: State, wanted: Waypoint, gains: Gains) -> tuple[float, float]:
     """N, world frame: proportional and integral, cut to the largest thrust."""
     force_x = gains.velocity_gain * (gains.cruise_speed * wanted.x - motion.vx) + pilot.push_x
     force_y = gains.velocity_gain * (gains.cruise_speed * wanted.y - motion.vy) + pilot.push_y
@@ -171,13 +171,15 @@ def _force(pilot: Pilot, motion: State, wanted: Waypoint, gains: Gains) -> tuple
     return share * force_x, share * force_y
 
 
-def _helm(force: tuple[float, float], wanted: Waypoint, motion: State, gains: Gains) -> Commands:
+def helm(force: tuple[float, float], wanted: Waypoint, motion: State, gains: Gains) -> Commands:
     """Thrust: the part of the force along the heading. Steering: toward the force, but never round to brake."""
     force_x, force_y = force
     ahead = max(force_x * wanted.x + force_y * wanted.y, AHEAD * gains.thrust_max)
     aside = force_y * wanted.x - force_x * wanted.y
-    heading = math.atan2(ahead * wanted.y + aside * wanted.x, ahead * wanted.x - aside * wanted.y)
-    error = math.remainder(heading - motion.heading, 2.0 * math.pi)
+    # which way round is decided by the direction to go alone: while the craft turns, the side force of the bow
+    # thruster swings the force that is wanted, and with it the shorter way would swing to and fro
+    turn = math.remainder(math.atan2(wanted.y, wanted.x) - motion.heading, 2.0 * math.pi)
+    error = turn + math.atan2(aside, ahead)
     steering = _held(gains.heading_gain * error - gains.yaw_rate_gain * motion.yaw_rate, -1.0, 1.0)
     thrust = force_x * math.cos(motion.heading) + force_y * math.sin(motion.heading)
     return Commands(_held(thrust, 0.0, gains.thrust_max), max(steering, 0.0), max(-steering, 0.0))
