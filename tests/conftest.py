@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 from hovercraft_fmu import build_fmu
+from hovercraft_fmu.autopilot.package import build_autopilot
 from hovercraft_fmu.fmu.native_package import build_native_fmu, has_compiler
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -34,6 +35,12 @@ def native_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not has_compiler():
         pytest.skip("no ziglang: pip install 'hovercraft-fmu[native]'")
     return build_native_fmu(tmp_path_factory.mktemp("native") / "HovercraftNative.fmu")
+
+
+@pytest.fixture(scope="session")
+def autopilot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The autopilot's FMU of this tree."""
+    return build_autopilot(tmp_path_factory.mktemp("autopilot") / "Autopilot.fmu")
 
 
 @pytest.fixture(scope="session", params=["python", "native"])

@@ -57,7 +57,9 @@ def test_demo(shell: Shell) -> None:
 
 def test_build_and_validate(shell: Shell) -> None:
     assert shell.run("validate").returncode == 1
-    assert "Hovercraft.fmu" in shell.ok("build")
+    printed = shell.ok("build", "--ssp")
+    for name in ("Hovercraft.fmu", "Autopilot.fmu", "HovercraftLoop.ssp"):
+        assert f"build/{name}: {(shell.folder / 'build' / name).stat().st_size / 1000:.0f} kB" in printed
     assert shell.ok("validate").count("  ok    ") == 3
     assert shell.ok("validate", "build/Hovercraft.fmu", "build/Hovercraft.fmu").count("checking") == 2
 

@@ -13,6 +13,7 @@ around it:
   and the density are, and is what makes the craft crab in a crosswind.
 - Heading. The propeller pushes along the heading, so the bow goes where the force is wanted; the thrust is the force's
   part along the heading. Steering is proportional to the heading error and to the yaw rate. One thruster at a time.
+  A force that is wanted behind the craft is left to the drag: the bow stays within 90 degrees of the way to go.
 
 The start values of the gains are for the textbook craft (m = 100 kg, I = 500 kg.m2, k = 57.4 kg/m; steering moment
 M = 0.5*20 m*3 N = 30 N.m):
@@ -24,7 +25,7 @@ M = 0.5*20 m*3 N = 30 N.m):
 - Line of sight: D = 20 m, one length, at U = 0.3 m/s is 0.015 rad/s, a sixth of that.
 - U = 0.3 m/s is 7/10 of the top speed: what is left is for the wind.
 
-Half or twice the mass moves that crossing to 0.12 or 0.06 rad/s, and leaves 103 or 92 degrees.
+Half or twice the mass moves that crossing to 0.11 or 0.06 rad/s, and leaves 103 or 92 degrees.
 """
 
 import math
