@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from hovercraft_fmu.autopilot import guidance
 from hovercraft_fmu.autopilot.guidance import Commands, Gains, Pilot, Waypoint, check_gain, steer
-from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.autopilot.interface import DEMO_COURSE
+from hovercraft_fmu.model.craft import Craft, preset
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import integrator
 from hovercraft_fmu.model.subcycling import Settings, advance
@@ -150,6 +151,19 @@ def test_a_wind_that_it_cannot_stem_is_no_reason_to_wind_up() -> None:
         state = advance(state, Controls(*commands, wind, 0.0), Craft(), 0.5, RK4).state
         assert math.hypot(pilot.push_x, pilot.push_y) <= Gains().thrust_max
     assert state.vx == pytest.approx(Gains().cruise_speed, rel=0.1)
+
+
+@pytest.mark.parametrize(("cruise_speed", "widest"), [(0.5, 10.0), (2.0, 50.0)])
+@pytest.mark.parametrize("wind", [0.0, 0.2])
+def test_on_ice_it_swings_wide_and_still_arrives(cruise_speed: float, widest: float, wind: float) -> None:
+    gains, course = Gains(cruise_speed=cruise_speed), [Waypoint(*point) for point in DEMO_COURSE]
+    state, pilot, steps = State(), Pilot(Waypoint(0.0, 0.0)), 0
+    while pilot.reached < len(course):
+        pilot, commands, sight = steer(pilot, state, course, gains, 0.5)
+        assert abs(sight.cross_track) < widest
+        state = advance(state, Controls(*commands, 0.0, wind), preset("ice"), 0.5, RK4).state
+        steps += 1
+        assert steps < 2000
 
 
 def margin(mass: float) -> tuple[float, float]:

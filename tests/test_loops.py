@@ -158,8 +158,9 @@ def test_the_command_writes_what_is_committed(tmp_path: Path) -> None:
             list(csv.reader((folder / name).read_text(encoding="utf-8").splitlines())) for folder in (tmp_path, RESULTS)
         )
         assert [row[:-1] for row in ours] == [row[:-1] for row in committed]
-        last = [[float(row[-1]) for row in rows[1:]] for rows in (ours, committed)]
-        assert last[0] == pytest.approx(last[1], rel=0.02)
+        for row, before in zip(ours[1:], committed[1:], strict=True):
+            if "never" not in row:  # a craft that has lost its way may be anywhere
+                assert float(row[-1]) == pytest.approx(float(before[-1]), rel=0.02), row
     assert (tmp_path / "coupling.png").stat().st_size > 10000
 
 

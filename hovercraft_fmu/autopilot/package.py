@@ -9,6 +9,8 @@ from .guidance import __doc__ as law
 from .interface import AUTOPILOT, AUTOPILOT_MODEL
 
 HERE = Path(__file__).parent
+PICTURE = "loop.png"
+"""A voyage, as `hovercraft-fmu demo --loop` draws it."""
 ALWAYS = ("style.css", "externalDependencies.txt", "licenses/license.txt")
 """Of the hovercraft's documentation, what holds for this FMU, too."""
 
@@ -21,7 +23,8 @@ def build_autopilot(path: str | os.PathLike[str] = f"build/{AUTOPILOT.identifier
 def _documents() -> dict[str, bytes]:
     values = {"model": AUTOPILOT_MODEL, "variables": AUTOPILOT_MODEL.variables, "law": law}
     pages = {name: page.encode() for name, page in rendered(HERE, values).items()}
-    return {**{name: (STATIC / name).read_bytes() for name in ALWAYS}, **pages}
+    shared = {name: (STATIC / name).read_bytes() for name in ALWAYS}
+    return {**shared, PICTURE: (HERE / PICTURE).read_bytes(), **pages}
 
 
 CONTENT = Content(
