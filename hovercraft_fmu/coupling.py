@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from .autopilot.guidance import Commands, Gains, Pilot, Sight, Waypoint, steer
@@ -35,6 +36,9 @@ JACOBI, GAUSS_SEIDEL = SCHEMES = ("jacobi", "gauss_seidel")
 with what the autopilot shows after its step."""
 OUTPUTS = tuple(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output")
 COLUMNS = ("time", *STATES, *OUTPUTS)
+WIND = INPUTS[3:]
+START_VALUES = (*CRAFT_PARAMETERS, *STATES, *WIND)
+"""Of the hovercraft: what a voyage may set."""
 DEFAULT_AUTOPILOT = Path("build") / f"{AUTOPILOT_MODEL.name}.fmu"
 
 
@@ -110,14 +114,14 @@ def sail(
         which: the voyage, or its name.
         fmu, autopilot: the files; without them those in build/, which are built if they are not there.
         scheme: one of SCHEMES.
-        communication_step, stop_time: s; without them the voyage's.
+        communication_step, stop_time: s; without them the voyage's. Whole communication steps are made.
         progress: see `simulation.Progress`.
 
     Raises:
         ValueError: a name or a value that cannot be; FileNotFoundError: no such file.
         SimulationError: an FMU refused a value or a step, with its message.
     """
-    chosen = voyage(which) if isinstance(which, str) else which
+    chosen = _chosen(which)
     if autopilot is None:
         autopilot = DEFAULT_AUTOPILOT if DEFAULT_AUTOPILOT.exists() else build_autopilot(DEFAULT_AUTOPILOT)
     messages: list[str] = []
@@ -130,9 +134,7 @@ def sail(
             craft.start(chosen.craft)
             pilot.start({name: chosen.craft[name] for name in STATES if name in chosen.craft})
             return _sail(craft, pilot, chosen, scheme, communication_step, stop_time, progress)
-        except ValueError:
-            raise
-        except Exception as error:  # fmpy's, of a call that failed
+        except FMICallException as error:
             raise SimulationError("; ".join(messages) or str(error)) from error
 
 
@@ -145,9 +147,17 @@ def sail_bare(
     settings: Settings = Settings(),  # noqa: B008 - immutable
 ) -> Passage:
     """The same with the bare functions. Raises as these do."""
-    chosen = voyage(which) if isinstance(which, str) else which
+    chosen = _chosen(which)
     craft = BareCraft(chosen, settings)
     return _sail(craft, BareAutopilot(craft.state), chosen, scheme, communication_step, stop_time)
+
+
+def _chosen(which: str | Voyage) -> Voyage:
+    chosen = voyage(which) if isinstance(which, str) else which
+    for name, value in chosen.craft.items():
+        if name not in START_VALUES:
+            raise ValueError(f"{name} = {value!r}: must be one of {', '.join(START_VALUES)}")
+    return chosen
 
 
 def _sail(
@@ -163,8 +173,9 @@ def _sail(
         raise ValueError(f"scheme = {scheme!r}: must be one of {', '.join(SCHEMES)}")
     h = chosen.communication_step if communication_step is None else communication_step
     end = chosen.stop_time if stop_time is None else stop_time
-    if not 0.0 < h < math.inf:
-        raise ValueError(f"communication_step = {h!r} s: must be a finite number greater than 0")
+    for name, value in (("communication_step", h), ("stop_time", end)):
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"{name} = {value!r} s: must be a finite number greater than 0")
     rows = []
     for time, shown in master(craft, pilot, scheme, h, round(end / h)):
         rows.append((time, *shown))
@@ -205,12 +216,14 @@ class FmuPart:
         self.shown = [self.by_name[name] for name in (STATES if craft else OUTPUTS)]
         self.taken = [self.by_name[name].reference for name in (COMMANDS if craft else STATES)]
         self.getters = {"Real": instance.getReal, "Integer": instance.getInteger, "Boolean": instance.getBoolean}
+        self.setters = {"Real": instance.setReal, "Enumeration": instance.setInteger}
 
     def start(self, values: Mapping[str, float]) -> None:
         """Set start values and initialize."""
         self.instance.setupExperiment()
-        if values:
-            self.instance.setReal([self.by_name[name].reference for name in values], list(values.values()))
+        for name, value in values.items():
+            variable = self.by_name[name]
+            self.setters[variable.kind]([variable.reference], [value])
         self.instance.enterInitializationMode()
         self.instance.exitInitializationMode()
 
@@ -237,7 +250,7 @@ class FmuPart:
 def _part(path: Path, model: Model, messages: list[str]) -> Iterator[FmuPart]:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{path.name}")
-    with instantiated(path, read_description(path), messages) as (_, instance):
+    with instantiated(path, read_description(path, model=model.name), messages) as (_, instance):
         yield FmuPart(instance, model)
 
 
@@ -252,9 +265,9 @@ class BareCraft:
     """The hovercraft's model, without an FMU."""
 
     def __init__(self, chosen: Voyage, settings: Settings) -> None:
-        start = {name: chosen.craft.get(name, 0.0) for name in (*STATES, *INPUTS[3:])}
+        start = {name: chosen.craft.get(name, 0.0) for name in (*STATES, *WIND)}
         self.state = State(*(start[name] for name in STATES))
-        self.wind = tuple(start[name] for name in INPUTS[3:])
+        self.wind = tuple(start[name] for name in WIND)
         self.controls = Controls()
         self.craft, self.settings, self.proposed = _craft(chosen), settings, 0.0
 

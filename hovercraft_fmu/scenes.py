@@ -239,7 +239,7 @@ class Voyage:
     name: str
     description: str
     craft: Mapping[str, float] = field(default_factory=dict)
-    """Start values of the hovercraft that differ from its own."""
+    """Start values of the hovercraft that differ from its own: parameters, states, wind."""
     communication_step: float = 0.5
     """s"""
     stop_time: float = 4000.0

@@ -433,7 +433,7 @@ def _loaded(fmu: str | os.PathLike[str], messages: list[str]) -> Iterator[tuple[
     path = Path(fmu)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{MODEL_NAME}.fmu")
-    description = read_description(path)
+    description = read_description(path, model=MODEL_NAME)
     with instantiated(path, description, messages) as (folder, instance):
         yield folder, instance, description
 
@@ -448,14 +448,20 @@ def _refusals(messages: list[str]) -> Iterator[None]:
         raise SimulationError("; ".join(messages[said:]) or str(error)) from error
 
 
-def read_description(path: Path, validate: bool = True) -> Any:
-    """fmpy's model description. Raises ValueError where the file is no FMU or its description is not valid."""
+def read_description(path: Path, validate: bool = True, model: str | None = None) -> Any:
+    """fmpy's model description.
+
+    Raises:
+        ValueError: the file is no FMU, its description is not valid, or it is of another model than the given one.
+    """
     try:
         description = fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
         raise ValueError(f"{path}: must be an FMU with a valid model description; {error}") from error
     if description.fmiVersion != "2.0" or description.coSimulation is None:
         raise ValueError(f"{path}: must be an FMU for co-simulation, FMI 2.0")
+    if model and description.modelName != model:
+        raise ValueError(f"{path}: is an FMU of the model {description.modelName!r}: must be of {model!r}")
     return description
 
 

@@ -21,7 +21,7 @@ OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 for _prefix, _uri in (("ssc", SSC), ("ssd", SSD), ("ssv", SSV), ("osp", OSP), ("oms", OMS)):
     register_namespace(_prefix, _uri)
-SHOWN = (*(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output" and v.name not in COMMANDS),)
+SHOWN = tuple(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output" and v.name not in COMMANDS)
 """Outputs of the autopilot that nothing in the loop takes."""
 PARAMETERS = f"resources/{CRAFT}.ssv"
 
@@ -123,4 +123,7 @@ def _annotate_for_openmodelica(system: Element, step: float) -> None:
     """OMSimulator's master."""
     annotations = SubElement(_annotation(system, "org.openmodelica"), f"{{{OMS}}}Annotations")
     information = SubElement(annotations, f"{{{OMS}}}SimulationInformation")
-    SubElement(information, f"{{{OMS}}}FixedStepMaster", {"description": "oms-ma", "stepSize": repr(step)})
+    tolerances = {"absoluteTolerance": "1e-4", "relativeTolerance": "1e-4"}  # its own; a fixed step needs none
+    SubElement(
+        information, f"{{{OMS}}}FixedStepMaster", {"description": "oms-ma", "stepSize": repr(step), **tolerances}
+    )

@@ -20,8 +20,8 @@ from hovercraft_fmu.autopilot.guidance import Gains, Pilot, Waypoint, steer
 from hovercraft_fmu.autopilot.interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, GAINS, VARIABLES
 from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, STATES
 from hovercraft_fmu.model.dynamics import State
-from hovercraft_fmu.simulation import read_description
-from hovercraft_fmu.validation import SCHEMA, validate
+from hovercraft_fmu.simulation import plan, read_description, run_fmu
+from hovercraft_fmu.validation import SCHEMA, validate, validate_elsewhere
 from tests.blobs import with_build
 from tests.conftest import Fresh
 from tests.lowlevel import one
@@ -125,6 +125,12 @@ print(slave.get_real([6, 7, 8]))
 assert "numpy" not in sys.modules
 """
     assert fresh(code, tmp_path / "resources", flags=("-I", "-S")).strip() == "[6.0, 0.0, -0.0]"
+
+
+def test_the_commands_for_the_hovercraft_say_that_it_is_none(autopilot: Path) -> None:
+    for call in (lambda: run_fmu(plan("launch"), autopilot), lambda: list(validate_elsewhere(autopilot))):
+        with pytest.raises(ValueError, match=r"is an FMU of the model 'Autopilot': must be of 'Hovercraft'"):
+            call()
 
 
 # ---- values belong to the communication point

@@ -120,6 +120,7 @@ def test_list_scenes(shell: Shell) -> None:
         (("simulate", "--frob",), "No such option"),
         (("frob",), "No such command 'frob'"),
         (("validate", "nix.fmu"), "nix.fmu: no such FMU"),
+        (("validate", "--table", "nix.fmu"), "nix.fmu: no such FMU"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_clear_line(shell: Shell, arguments: tuple[str, ...], message: str) -> None:

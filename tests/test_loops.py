@@ -123,7 +123,16 @@ def test_what_cannot_be_is_refused(fmu: Path, autopilot: Path, tmp_path: Path) -
             ValueError, match=f"communication_step = {step!r} s: must be a finite number greater than 0"
         ):
             sail("calm", fmu, autopilot, communication_step=step)
-    with pytest.raises(FileNotFoundError, match=r"nix.fmu: no such FMU"):
+    for end in (0.0, math.nan):
+        with pytest.raises(ValueError, match=f"stop_time = {end!r} s: must be a finite number greater than 0"):
+            sail("calm", fmu, autopilot, stop_time=end)
+    with pytest.raises(
+        ValueError, match=r"Autopilot\.fmu: is an FMU of the model 'Autopilot': must be of 'Hovercraft'"
+    ):
+        sail("calm", autopilot, fmu)
+    with pytest.raises(ValueError, match=r"step_size = 0\.1: must be one of mass, inertia"):
+        sail_bare(Voyage("bad", "", {"step_size": 0.1}))
+    with pytest.raises(FileNotFoundError, match=r"nix\.fmu: no such FMU"):
         sail("calm", fmu, tmp_path / "nix.fmu")
     with pytest.raises(SimulationError, match=r"mass = -1.0: must be greater than 0"):
         sail(Voyage("bad", "", {"mass": -1.0}), fmu, autopilot)

@@ -194,10 +194,7 @@ def run_fmucontainer(fmu: Path) -> list[list[float]]:
         work = Path(folder)
         shutil.copy(fmu, work / "Hovercraft.fmu")
         content = {"name": "Container.fmu", "fmu": ["Hovercraft.fmu"], "step_size": COMMUNICATION_STEP}
-        (work / "container.json").write_text(json.dumps(content))
-        code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
-        command = [sys.executable, "-c", code, "-container", "container.json", "-fmu-directory", "."]
-        subprocess.run(command, cwd=work, check=True, stdout=subprocess.DEVNULL)
+        make_container(work, content)
         description = read_description(work / "Container.fmu")
         references = {variable.name: variable.valueReference for variable in description.modelVariables}
         with instantiated(work / "Container.fmu", description, []) as (_, instance):
@@ -210,6 +207,14 @@ def run_fmucontainer(fmu: Path) -> list[list[float]]:
                 instance.doStep(k * COMMUNICATION_STEP, COMMUNICATION_STEP)
                 rows.append(list(instance.getReal([references[name] for name in OUTPUTS])))
             return rows
+
+
+def make_container(folder: Path, content: Mapping[str, object]) -> None:
+    """Have fmucontainer make the FMU that `content` describes, from the FMUs in the folder, there."""
+    (folder / "container.json").write_text(json.dumps(content))
+    code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
+    command = [sys.executable, "-c", code, "-container", "container.json", "-fmu-directory", "."]
+    subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 
 def run_c(fmu: Path) -> list[list[float]]:

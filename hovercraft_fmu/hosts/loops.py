@@ -5,10 +5,7 @@ SSP file. A row is what both FMUs show at the end of a communication step: STATE
 autopilot.
 """
 
-import json
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,7 +17,7 @@ from ..fmu.extras import xml
 from ..fmu.interface import STATES, Model
 from ..scenes import VOYAGES
 from ..ssp import CRAFT, PARAMETERS, PILOT, build_ssp
-from . import HostError, load_tbb, run
+from . import HostError, load_tbb, make_container, run
 
 VOYAGE = VOYAGES["crosswind"]
 STEPS = 700
@@ -168,7 +165,7 @@ def fmucontainer_sequential(craft: Path, autopilot: Path) -> Rows:
 
 def _fmucontainer_json(craft: Path, autopilot: Path, options: Mapping[str, bool]) -> None:
     file_of = {CRAFT: craft.name, PILOT: autopilot.name}
-    content = {
+    content: dict[str, object] = {
         "name": "Loop.fmu",
         "fmu": [autopilot.name, craft.name],
         "step_size": STEP,
@@ -179,10 +176,7 @@ def _fmucontainer_json(craft: Path, autopilot: Path, options: Mapping[str, bool]
         "start": [[craft.name, name, value] for name, value in VOYAGE.craft.items()],
         **options,
     }
-    Path("loop.json").write_text(json.dumps(content))
-    code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
-    command = [sys.executable, "-c", code, "-container", "loop.json", "-fmu-directory", "."]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    make_container(Path(), content)
 
 
 def fmucontainer_ssp(craft: Path, autopilot: Path) -> Rows:
