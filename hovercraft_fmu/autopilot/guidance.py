@@ -5,7 +5,7 @@ around it:
 
 - Line of sight. On the leg from one waypoint to the next the craft is to go, at the cruise speed U, toward the point
   of the leg that lies the lookahead D further on, and no further than the waypoint (Fossen, Handbook of Marine Craft
-  Hydrodynamics and Motion Control, 2011, chapter 10). The cross-track error then falls as e' = -U*e/D.
+  Hydrodynamics and Motion Control, 2011, chapter 10). A small cross-track error falls as e' = -U*e/D.
 - Velocity. The craft slides: its course is not its heading. So what is controlled is the velocity v over ground: the
   force that is wanted is K*(v_wanted - v) + p, cut to what the propeller has. Its integral part p is that cut force
   behind a lag of the time T, p' = (force - p)/T: integral action as automatic reset, which cannot wind up (Astrom,
