@@ -25,9 +25,8 @@ from .simulation import (
     Progress,
     SimulationError,
     default_fmu,
-    instantiated,
+    loaded,
     path_length,
-    read_description,
     write_csv,
 )
 
@@ -248,9 +247,7 @@ class FmuPart:
 
 @contextmanager
 def _part(path: Path, model: Model, messages: list[str]) -> Iterator[FmuPart]:
-    if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{path.name}")
-    with instantiated(path, read_description(path, model=model.name), messages) as (_, instance):
+    with loaded(path, messages, model.name) as (_, instance, _):
         yield FmuPart(instance, model)
 
 

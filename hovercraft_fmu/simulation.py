@@ -339,7 +339,7 @@ def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = N
             progress(time)
         return True
 
-    with _loaded(fmu, messages) as (folder, instance, description), _refusals(messages):
+    with loaded(fmu, messages) as (folder, instance, description), _refusals(messages):
         data = fmpy.simulate_fmu(
             folder,
             model_description=description,
@@ -423,17 +423,22 @@ class Stepper:
 def stepping(run: Run, fmu: str | os.PathLike[str]) -> Iterator[Stepper]:
     """An FMU to step by hand, not yet started. Raises as `simulate` does."""
     messages: list[str] = []
-    with _loaded(fmu, messages) as (_, instance, description):
+    with loaded(fmu, messages) as (_, instance, description):
         yield Stepper(instance, description, run, messages)
 
 
 @contextmanager
-def _loaded(fmu: str | os.PathLike[str], messages: list[str]) -> Iterator[tuple[str, Any, Any]]:
-    """The folder an FMU is extracted to, an instance in it, its description."""
+def loaded(fmu: str | os.PathLike[str], messages: list[str], model: str = MODEL_NAME) -> Iterator[tuple[str, Any, Any]]:
+    """The folder an FMU is extracted to, an instance in it, its description.
+
+    Raises:
+        FileNotFoundError: no such file; ValueError, SimulationError: see `read_description`, `instantiated`.
+    """
     path = Path(fmu)
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{MODEL_NAME}.fmu")
-    description = read_description(path, model=MODEL_NAME)
+        command = "build" if model == MODEL_NAME else "build --ssp"
+        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu {command}' writes build/{model}.fmu")
+    description = read_description(path, model=model)
     with instantiated(path, description, messages) as (folder, instance):
         yield folder, instance, description
 
