@@ -5,21 +5,36 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import click
 import numpy as np
 from rich.console import Console, Group
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
+from rich.text import Text
 
 from ._version import __version__
+from .autopilot.interface import AUTOPILOT
+from .autopilot.package import build_autopilot
+from .coupling import Passage, sail
 from .fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from .fmu.native_package import build_native_fmu, has_compiler
 from .fmu.package import build_fmu
 from .model.craft import PRESETS
-from .scenes import CONTROL_LOGS, SCENES
+from .scenes import CONTROL_LOGS, SCENES, VOYAGES
 from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, default_fmu, plan, simulate
+from .ssp import build_ssp
 from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE
 from .view.tables import markdown
@@ -53,6 +68,7 @@ def commands(context: click.Context) -> None:
     \b
     New here?
       hovercraft-fmu demo                          build, check and drive it; see build/demo/
+      hovercraft-fmu demo --loop                   the same with an autopilot at the helm
       hovercraft-fmu build                         write build/Hovercraft.fmu and build/HovercraftNative.fmu
       hovercraft-fmu drive                         the arrow keys, in a window
       hovercraft-fmu simulate --scene turn --plot turn.png
@@ -65,7 +81,8 @@ def commands(context: click.Context) -> None:
 @commands.command()
 @click.option("--native", is_flag=True, help="The native FMU alone.")
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="With --native: FMI 2.0 (the default) or 3.0.")
-def build(native: bool, fmi: str) -> None:
+@click.option("--ssp", is_flag=True, help="Then the autopilot's FMU, and an SSP file of the closed loop with each FMU.")
+def build(native: bool, fmi: str, ssp: bool) -> None:
     """Write build/Hovercraft.fmu and, where its compiler is installed, build/HovercraftNative.fmu.
 
     With --native --fmi 3: build/HovercraftNative3.fmu. The compiler of the native FMUs: pip install
@@ -73,13 +90,26 @@ def build(native: bool, fmi: str) -> None:
     """
     if fmi == "3" and not native:
         raise click.UsageError("--fmi 3: must be given with --native; the Python FMU is FMI 2.0")
+    if fmi == "3" and ssp:
+        raise click.UsageError("--ssp: must not be given with --fmi 3; the loop is of FMI 2.0")
+    built = []
     if not native:
-        _print_built(build_fmu(), PYTHON, "Python")
+        built.append(build_fmu())
+        _print_built(built[-1], PYTHON, "Python")
     if native or has_compiler():
         flavour = NATIVE3 if fmi == "3" else NATIVE
-        _print_built(build_native_fmu(flavour=flavour), flavour, "native")
+        built.append(build_native_fmu(flavour=flavour))
+        _print_built(built[-1], flavour, "native")
     else:
         OUTPUT.print("no native FMU: its compiler is not installed: pip install 'hovercraft-fmu\\[native]'")
+    if ssp:
+        autopilot = build_autopilot()
+        _print_built(autopilot, AUTOPILOT, "Python")
+        for fmu in built:
+            path = build_ssp(fmu.with_name(f"{fmu.stem}Loop.ssp"), fmu, autopilot)
+            OUTPUT.print(
+                f"{path}: {path.stat().st_size / 1000:.0f} kB, SSP 1.0, the loop of {fmu.name} and {autopilot.name}"
+            )
 
 
 def _print_built(path: Path, flavour: Flavour, language: str) -> None:
@@ -209,12 +239,12 @@ def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
 
 
 @commands.command()
-def demo() -> None:
+@click.option("--loop", is_flag=True, help="The closed loop: an autopilot FMU takes it round a course in a crosswind.")
+def demo(loop: bool) -> None:
     """Build the FMU, check it, and drive it over a recorded control log; see build/demo/."""
-    fmu = build_fmu()
-    OUTPUT.print(f"built {fmu}")
-    if _validated(fmu):
-        raise click.ClickException("the FMU is not valid")
+    fmu = _built_and_valid(build_fmu())
+    if loop:
+        return _demo_of_the_loop(fmu, _built_and_valid(build_autopilot()))
     result = _simulated(DEMO_LOG, fmu, preset="ice", communication_step=SCENES["ice"].communication_step)
     _print_result(result)
     _write(result, DEMO_FOLDER / "ice.csv", DEMO_FOLDER / "ice.png")
@@ -224,6 +254,25 @@ def demo() -> None:
         "  hovercraft-fmu simulate --scene ice --set mass=200 --plot build/heavy.png\n"
         "  hovercraft-fmu simulate --list-scenes"
     )
+    return None
+
+
+def _built_and_valid(fmu: Path) -> Path:
+    OUTPUT.print(f"built {fmu}")
+    if _validated(fmu):
+        raise click.ClickException("the FMU is not valid")
+    return fmu
+
+
+def _demo_of_the_loop(fmu: Path, autopilot: Path) -> None:
+    voyage = VOYAGES["crosswind"]
+    with _progress(voyage.stop_time) as progress:
+        passage = sail(voyage, fmu, autopilot, progress=progress)
+    _print_passage(passage)
+    OUTPUT.print(f"wrote {passage.write_csv(DEMO_FOLDER / 'loop.csv')}")
+    from .view.plots import plot_passage
+
+    OUTPUT.print(f"wrote {plot_passage(passage, DEMO_FOLDER / 'loop.png')}")
 
 
 @commands.command()
@@ -269,6 +318,60 @@ def scene_terms(output: Path) -> None:
     _measure(study.run, output)
 
 
+@commands.command("sweep")
+@click.argument("study", required=False)
+@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@click.option("--engine", metavar="NAME", default="fmu", show_default=True,
+              help="fmu, or batch: the bare model, all craft at once (fixed-step integrators).")  # fmt: skip
+@click.option("--workers", type=int, metavar="N", help="Processes on this machine. Default: one a processor.")
+@click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
+@click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Default: build/sweep/ and the study.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the results.")
+@click.option("--benchmark", is_flag=True, help="Measure what a run costs, beside fmpy's own way, and stop (minutes).")
+def sweep_command(
+    study: str | None, fmu: Path | None, output: Path | None, plot: Path | None, benchmark: bool, **options: Any
+) -> None:
+    """Make many runs of one FMU, in parallel, into Parquet files.
+
+    STUDY is a TOML file, or the name of a study of the package: turning_circle. FMU is the file; without it
+    build/Hovercraft.fmu, which is built if it is not there. (The native FMU is many times as fast.) A sweep that was
+    ended goes on where it was with the same command.
+    """
+    from .sweep import read_study, sweep
+
+    if benchmark:
+        from .sweep.benchmark import run
+
+        return _measure(run, output or Path("build") / "sweep_benchmark")
+    if study is None:
+        raise click.UsageError("STUDY: must be given")
+    chosen = read_study(study)
+    begun = perf_counter()
+    with _progress(chosen.runs, "sweeping", MofNCompleteColumn(), _Rate()) as tell:
+        outcome = sweep(chosen, fmu, output=output, tell=tell, **options)
+    seconds = perf_counter() - begun
+    OUTPUT.print(f"{outcome.folder}: {outcome.runs} runs, {outcome.new} of them made now in {seconds:.1f} s")
+    if outcome.error:
+        OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}", markup=False)
+    if outcome.warned:
+        OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
+    _print_extremes(outcome.folder)
+    if plot:
+        from .sweep.plots import plot_sweep
+
+        OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
+    return None
+
+
+@commands.command()
+@click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "coupling", show_default=True)
+def coupling(output: Path) -> None:
+    """Measure what the communication step of the closed loop costs, for two ways to couple, beside the integrator."""
+    from .trade import coupling as study
+
+    _measure(study.run, output)
+
+
 @commands.command("cross-check")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def cross_check_command(folder: Path) -> None:
@@ -298,10 +401,17 @@ def _settings(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
     return settings
 
 
+class _Rate(ProgressColumn):
+    """Runs a second."""
+
+    def render(self, task: Task) -> Text:
+        return Text(f"{task.speed:.3g} runs/s" if task.speed else "")
+
+
 @contextmanager
-def _progress(total: float, doing: str = "simulating") -> Iterator[Callable[[float], None]]:
+def _progress(total: float, doing: str = "simulating", *more: ProgressColumn) -> Iterator[Callable[[float], None]]:
     """A bar with the time left, on a terminal; it goes away when the run has ended."""
-    columns = (TextColumn(doing), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    columns = (TextColumn(doing), BarColumn(), TaskProgressColumn(), *more, TimeRemainingColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("", total=total)
@@ -356,9 +466,45 @@ def _print_scenes() -> None:
     OUTPUT.print(table)
 
 
+def _print_extremes(folder: Path) -> None:
+    from .sweep.store import extremes
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("column", "least", "of the run with", "greatest", "of the run with"):
+        table.add_column(title)
+    for each in extremes(folder):
+        cells = [each.column]
+        for value, run in ((each.least, each.least_run), (each.greatest, each.greatest_run)):
+            cells += [f"{value:.4g} {each.unit}", ", ".join(f"{name} = {part:.4g}" for name, part in run.items())]
+        table.add_row(*cells)
+    if table.row_count:
+        OUTPUT.print(table)
+
+
+def _print_passage(passage: Passage) -> None:
+    off = np.abs(passage["cross_track_error"])
+    arrived = f"after {passage['time'][-1]:g} s" if passage.arrived else "no"
+    distance = passage.distance
+    _print_rows(
+        f"{passage.voyage.name}: {passage.voyage.description}",
+        {
+            "waypoints reached": f"{int(passage['waypoint'][-1]) - (not passage.arrived)} of {len(passage.waypoints)}",
+            "arrived": arrived,
+            "distance": f"{distance:.2f} m, {distance / passage.craft.length:.1f} craft lengths",
+            "off the legs": f"{off.mean():.2f} m in the mean, {off.max():.2f} m where a leg begins",
+        },
+    )
+
+
+def _print_rows(title: str, rows: dict[str, str]) -> None:
+    table = Table(title=title, title_justify="left", show_header=False, box=None, pad_edge=False)
+    for name, text in rows.items():
+        table.add_row(name, text)
+    OUTPUT.print(table)
+
+
 def _print_result(result: Result) -> None:
     run = result.run
-    table = Table(title=f"{run.title}: {run.method}", title_justify="left", show_header=False, box=None, pad_edge=False)
     rows = {
         "duration": f"{result['time'][-1] - run.start_time:g} s, {len(result['time']) - 1} communication steps",
         "sub-steps": f"{result['substeps'][-1]}",
@@ -370,9 +516,7 @@ def _print_result(result: Result) -> None:
         "end heading": f"{np.degrees(result['pose.heading'][-1]):.2f} deg",
         "end speed": f"{result['speed'][-1]:.4f} m/s",
     }
-    for name, text in rows.items():
-        table.add_row(name, text)
-    OUTPUT.print(table)
+    _print_rows(f"{run.title}: {run.method}", rows)
     for warning in result.warnings:
         OUTPUT.print(f"warning: {warning}", markup=False)
 

@@ -230,3 +230,37 @@ SCENES: Mapping[str, Scene] = MappingProxyType(
         )
     }
 )
+
+
+@dataclass(frozen=True)
+class Voyage:
+    """A course for the hovercraft and its autopilot, which is the one in the autopilot's start values."""
+
+    name: str
+    description: str
+    craft: Mapping[str, float] = field(default_factory=dict)
+    """Start values of the hovercraft that differ from its own: parameters, states, wind."""
+    communication_step: float = 0.5
+    """s"""
+    stop_time: float = 4000.0
+    """s: it must have arrived by then"""
+
+
+def voyage(name: str) -> Voyage:
+    """The named voyage. Raises ValueError with the names there are."""
+    if name not in VOYAGES:
+        raise ValueError(f"voyage = {name!r}: must be one of {', '.join(VOYAGES)}")
+    return VOYAGES[name]
+
+
+VOYAGES: Mapping[str, Voyage] = MappingProxyType(
+    {
+        each.name: each
+        for each in (
+            Voyage("calm", "the textbook craft in air at rest"),
+            Voyage("half_mass", "half the mass", {"mass": 50.0}),
+            Voyage("double_mass", "twice the mass", {"mass": 200.0}),
+            Voyage("crosswind", "a wind of 0.2 m/s, half the top speed, down the screen", {"wind.y": 0.2}),
+        )
+    }
+)

@@ -48,6 +48,8 @@ Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
 Progress: TypeAlias = Callable[[float], None]
 """Called with the time [s] reached, after every communication step."""
 
+VERSIONS = ("2.0", "3.0")
+"""Of FMI, that are run here."""
 DEFAULT_FMU = Path("build") / f"{MODEL_NAME}.fmu"
 
 
@@ -125,14 +127,24 @@ class Result:
     @property
     def distance(self) -> float:
         """m: length of the path from communication point to communication point."""
-        return float(np.hypot(np.diff(self["pose.x"]), np.diff(self["pose.y"])).sum())
+        return path_length(self["pose.x"], self["pose.y"])
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write all columns as CSV, with all digits. Raises OSError where that cannot be done."""
-        path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fmpy.util.write_csv(path, self.data)
-        return path
+        return write_csv(self.data, path)
+
+
+def path_length(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """m: of a polyline."""
+    return float(np.hypot(np.diff(x), np.diff(y)).sum())
+
+
+def write_csv(data: NDArray[np.void], path: str | os.PathLike[str]) -> Path:
+    """Write a structured array as CSV, with all digits; its folder is made."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fmpy.util.write_csv(path, data)
+    return path
 
 
 def simulate(
@@ -330,7 +342,7 @@ def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = N
             progress(time)
         return True
 
-    with _loaded(fmu, messages) as (folder, instance, description), _refusals(messages):
+    with loaded(fmu, messages) as (folder, instance, description), _refusals(messages):
         data = fmpy.simulate_fmu(
             folder,
             model_description=description,
@@ -437,17 +449,24 @@ def get_reals(instance: Any, references: Sequence[int]) -> list[float]:
 def stepping(run: Run, fmu: str | os.PathLike[str]) -> Iterator[Stepper]:
     """An FMU to step by hand, not yet started. Raises as `simulate` does."""
     messages: list[str] = []
-    with _loaded(fmu, messages) as (_, instance, description):
+    with loaded(fmu, messages) as (_, instance, description):
         yield Stepper(instance, description, run, messages)
 
 
 @contextmanager
-def _loaded(fmu: str | os.PathLike[str], messages: list[str]) -> Iterator[tuple[str, Any, Any]]:
-    """The folder an FMU is extracted to, an instance in it, its description."""
+def loaded(
+    fmu: str | os.PathLike[str], messages: list[str], model: str = MODEL_NAME, versions: Sequence[str] = VERSIONS
+) -> Iterator[tuple[str, Any, Any]]:
+    """The folder an FMU is extracted to, an instance in it, its description.
+
+    Raises:
+        FileNotFoundError: no such file; ValueError, SimulationError: see `read_description`, `instantiated`.
+    """
     path = Path(fmu)
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{MODEL_NAME}.fmu")
-    description = read_description(path)
+        command = "build" if model == MODEL_NAME else "build --ssp"
+        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu {command}' writes build/{model}.fmu")
+    description = read_description(path, model=model, versions=versions)
     with instantiated(path, description, messages) as (folder, instance):
         yield folder, instance, description
 
@@ -462,14 +481,23 @@ def _refusals(messages: list[str]) -> Iterator[None]:
         raise SimulationError("; ".join(messages[said:]) or str(error)) from error
 
 
-def read_description(path: Path, validate: bool = True) -> Any:
-    """fmpy's model description. Raises ValueError where the file is no FMU or its description is not valid."""
+def read_description(
+    path: Path, validate: bool = True, model: str | None = None, versions: Sequence[str] = VERSIONS
+) -> Any:
+    """fmpy's model description.
+
+    Raises:
+        ValueError: the file is no FMU, its description is not valid, or it is of another model than the given one, or
+            of another version of FMI than these.
+    """
     try:
         description = fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
         raise ValueError(f"{path}: must be an FMU with a valid model description; {error}") from error
-    if description.fmiVersion not in ("2.0", "3.0") or description.coSimulation is None:
-        raise ValueError(f"{path}: must be an FMU for co-simulation, FMI 2.0 or 3.0")
+    if description.fmiVersion not in versions or description.coSimulation is None:
+        raise ValueError(f"{path}: must be an FMU for co-simulation, FMI {' or '.join(versions)}")
+    if model and description.modelName != model:
+        raise ValueError(f"{path}: is an FMU of the model {description.modelName!r}: must be of {model!r}")
     return description
 
 
@@ -566,7 +594,7 @@ def run_model(run: Run) -> Result:
         ValueError, NonFiniteError: as the model does.
     """
     craft, settings, state = run.craft, run.settings, run.start
-    controls = _controls(run, run.start_time, after_event=False)
+    controls = controls_at(run, run.start_time, after_event=False)
     count, stability, rotation, proposed = 0, 0.0, 0.0, 0.0
 
     def row(time: float) -> tuple[float, ...]:
@@ -585,7 +613,8 @@ def run_model(run: Run) -> Result:
     return Result(np.array(rows, dtype=[*((name, np.float64) for name in names), ("substeps", np.int32)]), run)
 
 
-def _controls(run: Run, time: float, after_event: bool) -> Controls:
+def controls_at(run: Run, time: float, after_event: bool) -> Controls:
+    """The inputs at a time [s], as fmpy's master interpolates them; at a jump, those before it or after it."""
     times = run.signals["time"]
     table = np.stack([run.signals[name] for name in INPUTS])
     values, _ = fmpy.simulation.Input.interpolate(time, times, table, after_event=after_event)
@@ -595,7 +624,7 @@ def _controls(run: Run, time: float, after_event: bool) -> Controls:
 def schedule(run: Run) -> Iterator[tuple[float, float, Controls]]:
     """(start, end) [s] of every communication step, and the controls that hold in it, as fmpy's master sets them."""
     for time, end in communication_points(run):
-        yield time, end, _controls(run, time, after_event=True)
+        yield time, end, controls_at(run, time, after_event=True)
 
 
 def communication_points(run: Run) -> Iterator[tuple[float, float]]:

@@ -15,6 +15,7 @@ import numpy as np
 from lxml import etree
 
 from . import hosts
+from .fmu.description import MODEL_NAME
 from .simulation import SimulationError, instantiated, read_description
 
 STEPS = 5
@@ -61,8 +62,13 @@ def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
 
 
 def validate_elsewhere(path: str | os.PathLike[str]) -> Iterator[Check]:
-    """The checkers and hosts that others wrote, where they are installed; for the hovercraft FMU only."""
+    """The checkers and hosts that others wrote, where they are installed.
+
+    Raises:
+        ValueError: not an FMU of the hovercraft, whose variables the hosts drive.
+    """
     path = Path(path)
+    read_description(path, validate=False, model=MODEL_NAME)
     others = hosts.hosts_of(path)
     toolbox = hosts.HOSTS["fmucontainer"]
     what, missing = "fmutool -check: schema and semantics", toolbox.missing()

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 from hovercraft_fmu import build_fmu
+from hovercraft_fmu.autopilot.package import build_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.native_package import build_native_fmu, has_compiler
 
@@ -48,6 +49,12 @@ def native3_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return _native(NATIVE3, "NATIVE3_FMU", tmp_path_factory.mktemp("native3"))
 
 
+@pytest.fixture(scope="session")
+def autopilot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The autopilot's FMU of this tree."""
+    return build_autopilot(tmp_path_factory.mktemp("autopilot") / "Autopilot.fmu")
+
+
 @pytest.fixture(scope="session", params=["python", "native", "native3"])
 def flavour(request: pytest.FixtureRequest) -> str:
     """All kinds of FMU, one after the other."""
@@ -58,6 +65,13 @@ def flavour(request: pytest.FixtureRequest) -> str:
 def each_fmu(flavour: str, request: pytest.FixtureRequest) -> Path:
     """The FMU of that kind."""
     made: Path = request.getfixturevalue("fmu" if flavour == "python" else f"{flavour}_fmu")
+    return made
+
+
+@pytest.fixture(scope="session", params=["fmu", "native_fmu"])
+def each_fmi_2_fmu(request: pytest.FixtureRequest) -> Path:
+    """Those of FMI 2.0, one after the other."""
+    made: Path = request.getfixturevalue(request.param)
     return made
 
 

@@ -57,7 +57,9 @@ def test_demo(shell: Shell) -> None:
 
 def test_build_and_validate(shell: Shell) -> None:
     assert shell.run("validate").returncode == 1
-    assert "Hovercraft.fmu" in shell.ok("build")
+    printed = shell.ok("build", "--ssp")
+    for name in ("Hovercraft.fmu", "Autopilot.fmu", "HovercraftLoop.ssp"):
+        assert f"build/{name}: {(shell.folder / 'build' / name).stat().st_size / 1000:.0f} kB" in printed
     assert shell.ok("validate").count("  ok    ") == 3
     assert shell.ok("validate", "build/Hovercraft.fmu", "build/Hovercraft.fmu").count("checking") == 2
 
@@ -118,6 +120,7 @@ def test_list_scenes(shell: Shell) -> None:
         (("simulate", "--frob",), "No such option"),
         (("frob",), "No such command 'frob'"),
         (("validate", "nix.fmu"), "nix.fmu: no such FMU"),
+        (("validate", "--table", "nix.fmu"), "nix.fmu: no such FMU"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_clear_line(shell: Shell, arguments: tuple[str, ...], message: str) -> None:

@@ -9,7 +9,8 @@ import fmpy
 import pytest
 from lxml import etree
 
-from hovercraft_fmu.fmu.interface import ACTION, INPUTS, MOTION, STATES, UNITS, VARIABLES, WATCHED
+from hovercraft_fmu.fmu.description import HOVERCRAFT
+from hovercraft_fmu.fmu.interface import ACTION, INPUTS, MOTION, STATES, VARIABLES, WATCHED
 from hovercraft_fmu.model.integrators import INTEGRATORS
 
 # name: (causality, variability, initial, unit, start)
@@ -107,7 +108,9 @@ def test_derivatives_limits_and_descriptions(description: Any) -> None:
 
 
 def test_units(description: Any, xml: Any) -> None:
-    assert {u.name: u.baseUnit is not None for u in description.unitDefinitions} == dict.fromkeys(UNITS, True)
+    assert {u.name: u.baseUnit is not None for u in description.unitDefinitions} == dict.fromkeys(
+        HOVERCRAFT.units, True
+    )
     assert xml.xpath("//Unit[@name='N']/BaseUnit/@*") == ["1", "1", "-2"]
     for name, degrees in (("rad", "deg"), ("rad/s", "deg/s")):
         (display,) = xml.xpath(f"//Unit[@name='{name}']/DisplayUnit")

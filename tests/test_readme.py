@@ -27,7 +27,7 @@ def commands() -> list[str]:
 
 def test_the_parts_are_found() -> None:
     assert len(blocks("python")) == 2
-    assert len(commands()) == 9
+    assert len(commands()) == 11
     assert commands()[0].endswith("hovercraft-fmu demo")
 
 

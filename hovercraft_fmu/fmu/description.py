@@ -1,7 +1,7 @@
 """The table of variables -> modelDescription.xml, for every flavour of the FMU: FMI 2.0 or 3.0."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement
@@ -89,6 +89,10 @@ class Flavour:
     """Files of sources/ to compile."""
     fmi: Literal[2, 3] = 2
     """The version of the standard."""
+
+    def of(self, model: Model) -> "Flavour":
+        """The same kind of FMU of another model."""
+        return replace(self, model=model, identifier=model.name)
 
 
 PYTHON = Flavour(

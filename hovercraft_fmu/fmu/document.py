@@ -4,6 +4,7 @@ import csv
 from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import jinja2
 
@@ -11,11 +12,13 @@ from .._version import __version__
 from ..model.craft import DRAG_AREAS, PRESETS
 from ..model.integrators import INTEGRATORS
 from .description import DESCRIPTION, FMI_3_TYPES, NATIVE, NATIVE3, PYTHON, Flavour
-from .interface import VARIABLES, WARNINGS, Variable
+from .interface import ACTION, MOTION, STATES, VARIABLES, WARNINGS, WATCHED, Variable
 
 FOLDER = Path(__file__).parent / "documentation"
 RESULTS = FOLDER / "results"
 """What `hovercraft-fmu trade` and `hovercraft-fmu stability` wrote, with `--output` there."""
+STUDY = Path(__file__).parent.parent / "sweep" / "studies" / "turning_circle.toml"
+"""The study that the page on sweeps explains."""
 
 CHECKED: Mapping[str, str] = {
     PYTHON.identifier: "checked.md",
@@ -26,19 +29,14 @@ CHECKED: Mapping[str, str] = {
 
 
 def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
-    """Path inside the documentation -> the whole page, for one of the FMUs."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(FOLDER), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
+    """Path inside the documentation -> the whole page, for one of the hovercraft's FMUs."""
     values = {
         "native": bool(flavour.sources),
         "flavour": flavour,
         "fmi": flavour.fmi,
-        "types": FMI_3_TYPES if flavour.fmi == 3 else {kind: kind for kind in FMI_3_TYPES},
-        "version": __version__,
+        "types": FMI_3_TYPES if flavour.fmi == 3 else {},
         "description": DESCRIPTION,
         "variables": VARIABLES,
-        "limits": _limits,
         "warnings": WARNINGS,
         "integrators": INTEGRATORS,
         "presets": PRESETS,
@@ -46,12 +44,23 @@ def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
         "checked": _checked(FOLDER / CHECKED[flavour.identifier]),
         "measured": _all_measured(),
         "machine": _machine(),
+        "study": STUDY.read_text(encoding="utf-8"),
+        "observed": (*STATES, *MOTION, *ACTION, *WATCHED),
     }
-    return {
-        template.removesuffix(".jinja"): environment.get_template(template).render(values)
-        for template in environment.list_templates(extensions=["jinja"])
-        if template.endswith(".html.jinja")
-    }
+    return rendered(FOLDER, values)
+
+
+def rendered(folder: Path, values: Mapping[str, Any]) -> dict[str, str]:
+    """Path -> page, of the templates NAME.html.jinja in a folder; they may include those in FOLDER."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader((folder, FOLDER)),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    environment.globals.update(version=__version__, limits=_limits)
+    names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.html.jinja"))
+    return {name.removesuffix(".jinja"): environment.get_template(name).render(values) for name in names}
 
 
 def _checked(table: Path) -> list[list[str]]:

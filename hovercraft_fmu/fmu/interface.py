@@ -1,14 +1,14 @@
 """THE table of variables. The XML, the slave, the documentation and the checks of names are made from it."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import sqrt
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
 from ..model.craft import DRAG_AREAS, Craft
-from ..model.dynamics import Controls, State, actuation, body_velocity, loads
+from ..model.dynamics import Controls, Namespace, State, actuation, body_velocity, loads
 from ..model.integrators import INTEGRATORS
 
 Kind: TypeAlias = Literal["Real", "Integer", "Enumeration", "Boolean"]
@@ -47,9 +47,11 @@ DEGREES_PER_RADIAN = 57.29577951308232
 UNITS: Mapping[str, Unit] = MappingProxyType(
     {
         "1": Unit("Ratio", "Dimensionless", {}),
+        "1/rad": Unit("PerAngle", "PerAngle", {"rad": -1}),
         "kg": Unit("Mass", "Mass", {"kg": 1}),
         "kg.m2": Unit("MomentOfInertia", "MomentOfInertia", {"kg": 1, "m": 2}),
         "kg/m3": Unit("Density", "Density", {"kg": 1, "m": -3}),
+        "kg/s": Unit("MassFlowRate", "MassFlowRate", {"kg": 1, "s": -1}),
         "m": Unit("Length", "Length", {"m": 1}),
         "m/s": Unit("Velocity", "Velocity", {"m": 1, "s": -1}),
         "m/s2": Unit("Acceleration", "Acceleration", {"m": 1, "s": -2}),
@@ -60,6 +62,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
         "rad/s": Unit("AngularVelocity", "AngularVelocity", {"rad": 1, "s": -1}, ("deg/s", DEGREES_PER_RADIAN)),
         "rad/s2": Unit("AngularAcceleration", "AngularAcceleration", {"rad": 1, "s": -2}),
         "s": Unit("Time", "Time", {"s": 1}),
+        "s/rad": Unit("TimePerAngle", "TimePerAngle", {"s": 1, "rad": -1}),
     }
 )
 
@@ -307,14 +310,14 @@ ACTION = (
 """In the order of `observe_action`."""
 
 
-def observe_motion(state: State) -> tuple[float, float, float]:
+def observe_motion(state: State, ns: Namespace = math) -> tuple[float, float, float]:
     """The calculated variables that follow from the state alone; order of MOTION."""
-    surge, sway = body_velocity(state)
-    return surge, sway, sqrt(state.vx * state.vx + state.vy * state.vy)
+    surge, sway = body_velocity(state, ns)
+    return surge, sway, ns.sqrt(state.vx * state.vx + state.vy * state.vy)
 
 
-def observe_action(state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
+def observe_action(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> tuple[float, ...]:
     """What acts on the craft at a state, with the controls of the step that led to it; order of ACTION."""
-    force_x, force_y, moment = loads(state, controls, craft)
+    force_x, force_y, moment = loads(state, controls, craft, ns)
     acceleration = (force_x / craft.mass, force_y / craft.mass, moment / craft.inertia)
-    return force_x, force_y, moment, *acceleration, *actuation(controls, craft)[:2]
+    return force_x, force_y, moment, *acceleration, *actuation(controls, craft, ns)[:2]

@@ -83,9 +83,14 @@ def write_python_fmu(path: str | os.PathLike[str], content: Content) -> Path:
 
 def write_fmu(path: str | os.PathLike[str], make: Callable[[], bytes]) -> Path:
     """Write what `make` makes to `path`. Raises as `build_fmu` does."""
+    return write_archive(path, ".fmu", make)
+
+
+def write_archive(path: str | os.PathLike[str], suffix: str, make: Callable[[], bytes]) -> Path:
+    """Write what `make` makes to `path`, which must have that suffix, at once or not at all."""
     path = Path(path)
-    if path.suffix != ".fmu":
-        raise ValueError(f"path = {str(path)!r}: must end in .fmu")
+    if path.suffix != suffix:
+        raise ValueError(f"path = {str(path)!r}: must end in {suffix}")
     content = make()
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")

@@ -1,5 +1,6 @@
 """The FMU in hosts that others wrote: each drives it over the same steps, and must give the bits that fmpy gives."""
 
+import ctypes
 import json
 import os
 import re
@@ -111,8 +112,13 @@ def run_in(host: str, fmu: Path) -> list[list[float]]:
     Raises:
         HostError: the host failed; the last of what it printed.
     """
-    command = [sys.executable, "-m", "hovercraft_fmu.hosts", host, str(fmu.absolute())]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    return run(["single", host, str(fmu.absolute())])
+
+
+def run(arguments: list[str], cwd: Path | None = None) -> list[list[float]]:
+    """What `python -m hovercraft_fmu.hosts` prints with these arguments. Raises HostError where that fails."""
+    command = [sys.executable, "-m", "hovercraft_fmu.hosts", *arguments]
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, timeout=300)
     if done.returncode != 0:
         raise HostError(f"exit status {done.returncode}: {done.stderr.strip()[-500:]}")
     rows: list[list[float]] = json.loads(done.stdout.splitlines()[-1])
@@ -164,12 +170,15 @@ def run_libcosimpy(fmu: Path) -> list[list[float]]:
     return rows
 
 
-def run_ecospy(fmu: Path) -> list[list[float]]:
-    """Ecos; its library needs the one in the package tbb, which must be loaded first."""
-    import ctypes
-
+def load_tbb() -> None:
+    """Ecos's library needs the one in the package tbb, which must be loaded first."""
     tbb = next(file for file in metadata.files("tbb") or [] if file.name == "libtbb.so.12")
     ctypes.CDLL(str(tbb.locate()), ctypes.RTLD_GLOBAL)
+
+
+def run_ecospy(fmu: Path) -> list[list[float]]:
+    """Ecos."""
+    load_tbb()
     from ecospy import EcosSimulation, EcosSimulationStructure
 
     structure = EcosSimulationStructure()
@@ -191,13 +200,17 @@ def run_fmucontainer(fmu: Path) -> list[list[float]]:
         work = Path(folder)
         shutil.copy(fmu, work / "Hovercraft.fmu")
         content = {"name": "Container.fmu", "fmu": ["Hovercraft.fmu"], "step_size": COMMUNICATION_STEP}
-        (work / "container.json").write_text(json.dumps(content))
-        version = fmpy.read_model_description(fmu).fmiVersion[0]
-        code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
-        command = [sys.executable, "-c", code, "-container", "container.json", "-fmu-directory", ".", "-fmi", version]
-        subprocess.run(command, cwd=work, check=True, stdout=subprocess.DEVNULL)
+        make_container(work, content, int(fmpy.read_model_description(fmu).fmiVersion[0]))
         container = fmpy.read_model_description(work / "Container.fmu")
         return _driven(work / "Container.fmu", {v.name: v.valueReference for v in container.modelVariables})
+
+
+def make_container(folder: Path, content: Mapping[str, object], fmi: int = 2) -> None:
+    """Have fmucontainer make the FMU that `content` describes, for that FMI, from the FMUs in the folder, there."""
+    (folder / "container.json").write_text(json.dumps(content))
+    code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
+    command = [sys.executable, "-c", code, "-container", "container.json", "-fmu-directory", ".", "-fmi", str(fmi)]
+    subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 
 def run_c(fmu: Path) -> list[list[float]]:

@@ -1,9 +1,11 @@
-"""python -m hovercraft_fmu.hosts HOST FMU: drive the FMU in a host, print the rows as JSON."""
+"""python -m hovercraft_fmu.hosts single HOST FMU, or loop MASTER CRAFT AUTOPILOT: run it, print the rows as JSON."""
 
 import json
 import sys
 from pathlib import Path
 
 from . import RUN
+from .loops import LOOPS
 
-print("\n" + json.dumps(RUN[sys.argv[1]](Path(sys.argv[2]))))
+kind, name, *files = sys.argv[1:]
+print("\n" + json.dumps((RUN if kind == "single" else LOOPS)[name](*map(Path, files))))

@@ -1,0 +1,1 @@
+"""The autopilot: its control law, and the FMU around it."""

@@ -1,0 +1,36 @@
+"""Builds the autopilot's FMU."""
+
+import os
+from pathlib import Path
+
+from ..fmu.document import rendered
+from ..fmu.package import STATIC, Content, write_python_fmu
+from .guidance import __doc__ as law
+from .interface import AUTOPILOT, AUTOPILOT_MODEL
+
+HERE = Path(__file__).parent
+PICTURE = "loop.png"
+"""A voyage, as `hovercraft-fmu demo --loop` draws it."""
+ALWAYS = ("style.css", "externalDependencies.txt", "licenses/license.txt")
+"""Of the hovercraft's documentation, what holds for this FMU, too."""
+
+
+def build_autopilot(path: str | os.PathLike[str] = f"build/{AUTOPILOT.identifier}.fmu") -> Path:
+    """Write the autopilot's FMU to `path` (its folder is made) and return the path. Raises as `build_fmu` does."""
+    return write_python_fmu(path, CONTENT)
+
+
+def _documents() -> dict[str, bytes]:
+    values = {"model": AUTOPILOT_MODEL, "variables": AUTOPILOT_MODEL.variables, "types": {}, "law": law}
+    pages = {name: page.encode() for name, page in rendered(HERE, values).items()}
+    shared = {name: (STATIC / name).read_bytes() for name in ALWAYS}
+    return {**shared, PICTURE: (HERE / PICTURE).read_bytes(), **pages}
+
+
+CONTENT = Content(
+    AUTOPILOT,
+    "autopilot.slave",
+    "AutopilotSlave",
+    tuple(f"autopilot/{name}.py" for name in ("__init__", "guidance", "interface", "slave")),
+    _documents,
+)

@@ -1,0 +1,308 @@
+"""The closed loop of hovercraft and autopilot: a small master for two FMUs, or for the bare functions behind them."""
+
+import math
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
+
+from .autopilot.guidance import Commands, Gains, Pilot, Sight, Waypoint, steer
+from .autopilot.interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
+from .autopilot.package import build_autopilot
+from .fmu.description import HOVERCRAFT
+from .fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES, Model
+from .model.craft import Craft
+from .model.dynamics import Controls, State
+from .model.subcycling import Settings, advance
+from .scenes import Voyage, voyage
+from .simulation import (
+    Progress,
+    SimulationError,
+    default_fmu,
+    loaded,
+    path_length,
+    write_csv,
+)
+
+JACOBI, GAUSS_SEIDEL = SCHEMES = ("jacobi", "gauss_seidel")
+"""Both parts step side by side, with what the other one showed before; or the autopilot steps first, and the craft
+with what the autopilot shows after its step."""
+OUTPUTS = tuple(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output")
+COLUMNS = ("time", *STATES, *OUTPUTS)
+WIND = INPUTS[3:]
+START_VALUES = (*CRAFT_PARAMETERS, *STATES, *WIND)
+"""Of the hovercraft: what a voyage may set."""
+DEFAULT_AUTOPILOT = Path("build") / f"{AUTOPILOT_MODEL.name}.fmu"
+
+
+class Part(Protocol):
+    """One side of the loop."""
+
+    def read(self) -> Sequence[float]:
+        """What the other side gets: of the craft STATES, of the autopilot COMMANDS, of its OUTPUTS the first."""
+
+    def write(self, values: Sequence[float]) -> None:
+        """What came from the other side."""
+
+    def step(self, time: float, duration: float) -> None:
+        """From one communication point [s] to the next."""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """How a voyage went: `passage["time"]`, the names of COLUMNS; one value a communication point, shape (n,)."""
+
+    data: NDArray[np.void]
+    voyage: Voyage
+    scheme: str
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in COLUMNS:
+            raise ValueError(f"column = {name!r}: must be one of {', '.join(COLUMNS)}")
+        return self.data[name]
+
+    @property
+    def arrived(self) -> bool:
+        """Whether all waypoints were reached."""
+        return bool(self["arrived"][-1])
+
+    @property
+    def craft(self) -> Craft:
+        """That sailed."""
+        return _craft(self.voyage)
+
+    @property
+    def distance(self) -> float:
+        """m: length of the path from communication point to communication point."""
+        return path_length(self["pose.x"], self["pose.y"])
+
+    def write_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write all columns as CSV, with all digits. Raises OSError where that cannot be done."""
+        return write_csv(self.data, path)
+
+    @property
+    def waypoints(self) -> tuple[tuple[float, float], ...]:
+        """m, world frame: the course."""
+        return DEMO_COURSE
+
+    @property
+    def acceptance_radius(self) -> float:
+        """m: a waypoint this near is reached."""
+        return Gains().acceptance_radius
+
+
+def sail(
+    which: str | Voyage = "calm",
+    fmu: str | Path | None = None,
+    autopilot: str | Path | None = None,
+    *,
+    scheme: str = JACOBI,
+    communication_step: float | None = None,
+    stop_time: float | None = None,
+    progress: Progress | None = None,
+) -> Passage:
+    """A voyage of the two FMUs, until the craft has arrived or the stop time is there.
+
+    Args:
+        which: the voyage, or its name.
+        fmu, autopilot: the files; without them those in build/, which are built if they are not there.
+        scheme: one of SCHEMES.
+        communication_step, stop_time: s; without them the voyage's. Whole communication steps are made.
+        progress: see `simulation.Progress`.
+
+    Raises:
+        ValueError: a name or a value that cannot be; FileNotFoundError: no such file.
+        SimulationError: an FMU refused a value or a step, with its message.
+    """
+    chosen = _chosen(which)
+    if autopilot is None:
+        autopilot = DEFAULT_AUTOPILOT if DEFAULT_AUTOPILOT.exists() else build_autopilot(DEFAULT_AUTOPILOT)
+    messages: list[str] = []
+    with ExitStack() as stack:
+        craft, pilot = (
+            stack.enter_context(_part(Path(path), model, messages))
+            for path, model in ((fmu or default_fmu(), HOVERCRAFT), (autopilot, AUTOPILOT_MODEL))
+        )
+        try:
+            craft.start(chosen.craft)
+            pilot.start({name: chosen.craft[name] for name in STATES if name in chosen.craft})
+            return _sail(craft, pilot, chosen, scheme, communication_step, stop_time, progress)
+        except FMICallException as error:
+            raise SimulationError("; ".join(messages) or str(error)) from error
+
+
+def sail_bare(
+    which: str | Voyage = "calm",
+    *,
+    scheme: str = JACOBI,
+    communication_step: float | None = None,
+    stop_time: float | None = None,
+    settings: Settings = Settings(),  # noqa: B008 - immutable
+) -> Passage:
+    """The same with the bare functions. Raises as these do."""
+    chosen = _chosen(which)
+    craft = BareCraft(chosen, settings)
+    return _sail(craft, BareAutopilot(craft.state), chosen, scheme, communication_step, stop_time)
+
+
+def _chosen(which: str | Voyage) -> Voyage:
+    chosen = voyage(which) if isinstance(which, str) else which
+    for name, value in chosen.craft.items():
+        if name not in START_VALUES:
+            raise ValueError(f"{name} = {value!r}: must be one of {', '.join(START_VALUES)}")
+    return chosen
+
+
+def _sail(
+    craft: Part,
+    pilot: Part,
+    chosen: Voyage,
+    scheme: str,
+    communication_step: float | None,
+    stop_time: float | None,
+    progress: Progress | None = None,
+) -> Passage:
+    if scheme not in SCHEMES:
+        raise ValueError(f"scheme = {scheme!r}: must be one of {', '.join(SCHEMES)}")
+    h = chosen.communication_step if communication_step is None else communication_step
+    end = chosen.stop_time if stop_time is None else stop_time
+    for name, value in (("communication_step", h), ("stop_time", end)):
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"{name} = {value!r} s: must be a finite number greater than 0")
+    rows = []
+    for time, shown in master(craft, pilot, scheme, h, round(end / h)):
+        rows.append((time, *shown))
+        if progress:
+            progress(time)
+        if shown[-1]:  # arrived
+            break
+    return Passage(np.array(rows, dtype=[(name, np.float64) for name in COLUMNS]), chosen, scheme)
+
+
+def master(
+    craft: Part, pilot: Part, scheme: str, communication_step: float, steps: int
+) -> Iterator[tuple[float, tuple[float, ...]]]:
+    """The loop: time [s], and what both parts show, at every communication point."""
+    for k in range(steps + 1):
+        time = k * communication_step
+        pose, outputs = craft.read(), pilot.read()
+        yield time, (*pose, *outputs)
+        if k == steps:
+            return
+        pilot.write(pose)
+        pilot.step(time, communication_step)
+        if scheme == GAUSS_SEIDEL:
+            outputs = pilot.read()
+        craft.write(outputs[: len(COMMANDS)])
+        craft.step(time, communication_step)
+
+
+# ---- the parts as FMUs
+
+
+class FmuPart:
+    """An instance of an FMU, through fmpy."""
+
+    def __init__(self, instance: Any, model: Model) -> None:
+        self.instance, self.by_name = instance, model.by_name
+        craft = model is HOVERCRAFT
+        self.shown = [self.by_name[name] for name in (STATES if craft else OUTPUTS)]
+        self.taken = [self.by_name[name].reference for name in (COMMANDS if craft else STATES)]
+        self.getters = {"Real": instance.getReal, "Integer": instance.getInteger, "Boolean": instance.getBoolean}
+        self.setters = {"Real": instance.setReal, "Enumeration": instance.setInteger}
+
+    def start(self, values: Mapping[str, float]) -> None:
+        """Set start values and initialize."""
+        self.instance.setupExperiment()
+        for name, value in values.items():
+            variable = self.by_name[name]
+            self.setters[variable.kind]([variable.reference], [value])
+        self.instance.enterInitializationMode()
+        self.instance.exitInitializationMode()
+
+    def read(self) -> Sequence[float]:
+        """See Part; of every type in one call."""
+        found: dict[str, float] = {}
+        for kind, get in self.getters.items():
+            of_kind = [v for v in self.shown if v.kind == kind]
+            if of_kind:
+                values = get([v.reference for v in of_kind])
+                found.update(zip((v.name for v in of_kind), values, strict=True))
+        return [found[v.name] for v in self.shown]
+
+    def write(self, values: Sequence[float]) -> None:
+        """See Part."""
+        self.instance.setReal(self.taken, values)
+
+    def step(self, time: float, duration: float) -> None:
+        """See Part."""
+        self.instance.doStep(time, duration)
+
+
+@contextmanager
+def _part(path: Path, model: Model, messages: list[str]) -> Iterator[FmuPart]:
+    with loaded(path, messages, model.name, versions=("2.0",)) as (_, instance, _):
+        yield FmuPart(instance, model)
+
+
+# ---- the parts as bare functions
+
+
+def _craft(chosen: Voyage) -> Craft:
+    return Craft(**{name: value for name, value in chosen.craft.items() if name in CRAFT_PARAMETERS})  # type: ignore[arg-type]
+
+
+class BareCraft:
+    """The hovercraft's model, without an FMU."""
+
+    def __init__(self, chosen: Voyage, settings: Settings) -> None:
+        start = {name: chosen.craft.get(name, 0.0) for name in (*STATES, *WIND)}
+        self.state = State(*(start[name] for name in STATES))
+        self.wind = tuple(start[name] for name in WIND)
+        self.controls = Controls()
+        self.craft, self.settings, self.proposed = _craft(chosen), settings, 0.0
+
+    def read(self) -> Sequence[float]:
+        """See Part."""
+        return self.state
+
+    def write(self, values: Sequence[float]) -> None:
+        """See Part."""
+        self.controls = Controls(*values, *self.wind)
+
+    def step(self, _time: float, duration: float) -> None:
+        """See Part."""
+        made = advance(self.state, self.controls, self.craft, duration, self.settings, proposed=self.proposed)
+        self.state, self.proposed = made.state, made.proposed
+
+
+class BareAutopilot:
+    """The autopilot's law, without an FMU."""
+
+    course = tuple(Waypoint(*point) for point in DEMO_COURSE)
+    gains = Gains()
+
+    def __init__(self, motion: State) -> None:
+        self.motion, self.pilot = motion, Pilot(Waypoint(motion.x, motion.y))
+        self.commands, self.sight = Commands(), Sight()
+        self.step(0.0, 0.0)
+
+    def read(self) -> Sequence[float]:
+        """See Part."""
+        reached, count = self.pilot.reached, len(self.course)
+        cross_track, distance = self.sight
+        return (*self.commands, min(reached + 1, count), cross_track, distance, reached == count)
+
+    def write(self, values: Sequence[float]) -> None:
+        """See Part."""
+        self.motion = State(*values)
+
+    def step(self, _time: float, duration: float) -> None:
+        """See Part."""
+        self.pilot, self.commands, self.sight = steer(self.pilot, self.motion, self.course, self.gains, duration)

@@ -1,0 +1,81 @@
+"""The communication points of a run, and which of them can be left out without changing a bit."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.dynamics import Controls
+from ..model.subcycling import Settings, substeps
+from ..simulation import Run, controls_at, schedule
+from .quantities import Keep
+
+
+class Leg(NamedTuple):
+    """A stretch of time with the controls held."""
+
+    time: float
+    """s, its start"""
+    end: float
+    """s"""
+    controls: Controls
+    kept: bool
+    """Whether what is at its end is kept."""
+
+
+class Timeline(NamedTuple):
+    """What every run of a study goes through."""
+
+    start: Controls
+    """At the start, before a jump there."""
+    start_kept: bool
+    legs: tuple[Leg, ...]
+    times: NDArray[np.float64]
+    """s, of the points that are kept; the last is the end."""
+    sampled: NDArray[np.bool_]
+    """Which of them are points of the trajectory."""
+
+
+def timeline(run: Run, keep: Keep) -> Timeline:
+    """The communication steps that `simulate` takes; the end is always kept."""
+    start = run.start_time
+
+    def is_sampled(time: float) -> bool:
+        steps = (time - start) / keep.every if keep.every else 0.5
+        return abs(steps - round(steps)) <= 1e-9 * max(1.0, steps)
+
+    legs = [Leg(time, end, controls, keep.watches or is_sampled(end)) for time, end, controls in schedule(run)]
+    legs[-1] = legs[-1]._replace(kept=True)
+    start_kept = keep.watches or is_sampled(start)
+    times = [start] * start_kept + [leg.end for leg in legs if leg.kept]
+    sampled = [is_sampled(time) for time in times[:-1]] + [keep.every is not None]
+    controls = controls_at(run, start, after_event=False)
+    return Timeline(controls, start_kept, tuple(legs), np.array(times), np.array(sampled))
+
+
+def merged(legs: Iterable[Leg], settings: Settings) -> list[Leg]:
+    """Legs with the same controls as one, where nothing is kept in between and no bit of the end changes.
+
+    That is where each of them, and the whole, is a whole number of sub-steps: then all are `step_size` long, however
+    the time is cut. Not with the adaptive method: it ends a step at every communication point.
+    """
+    if settings.integrator.integrate is None:
+        return list(legs)
+    whole: list[Leg] = []
+    for leg in legs:
+        last = whole[-1] if whole else None
+        if last and not last.kept and last.controls == leg.controls and _as_one(last, leg, settings.step_size):
+            whole[-1] = last._replace(end=leg.end, kept=leg.kept)
+        else:
+            whole.append(leg)
+    return whole
+
+
+def _as_one(first: Leg, second: Leg, step_size: float) -> bool:
+    try:
+        parts = [substeps(each.end - each.time, step_size) for each in (first, second)]
+        n, h = substeps(second.end - first.time, step_size)
+    except ValueError:  # an impossible step: who makes it says so
+        return False
+    return n == sum(part for part, _ in parts) and h == parts[0][1] == parts[1][1] == step_size

@@ -1,0 +1,274 @@
+"""The closed loop: it arrives, to the bit as the bare functions do; its error has an order; every master agrees."""
+
+import csv
+import hashlib
+import math
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import fmpy.ssp
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from lxml import etree
+from PIL import Image
+
+from hovercraft_fmu.autopilot.interface import COMMANDS
+from hovercraft_fmu.cli import commands
+from hovercraft_fmu.coupling import (
+    COLUMNS,
+    GAUSS_SEIDEL,
+    JACOBI,
+    SCHEMES,
+    BareAutopilot,
+    BareCraft,
+    Part,
+    Passage,
+    master,
+    sail,
+    sail_bare,
+)
+from hovercraft_fmu.fmu.interface import STATES
+from hovercraft_fmu.hosts import HOSTS
+from hovercraft_fmu.hosts.loops import LOOPS, STEP, STEPS, VOYAGE, loop_in
+from hovercraft_fmu.model.integrators import integrator
+from hovercraft_fmu.model.subcycling import Settings
+from hovercraft_fmu.scenes import VOYAGES, Voyage
+from hovercraft_fmu.simulation import SimulationError
+from hovercraft_fmu.ssp import build_ssp
+from hovercraft_fmu.trade import coupling as study
+from tests.conftest import ROOT
+
+RK4 = Settings(0.1, integrator(3))
+RESULTS = ROOT / "hovercraft_fmu" / "fmu" / "documentation" / "results"
+SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
+
+
+# ---- it arrives
+
+
+def assert_arrived(passage: Passage) -> None:
+    """Within the circle of every waypoint, one after the other; then everything is off."""
+    assert passage.arrived
+    track = np.column_stack((passage["pose.x"], passage["pose.y"]))
+    active, begin = passage["waypoint"].astype(int), 0
+    assert sorted(set(active)) == list(range(1, 7))
+    for point in passage.waypoints:
+        nearest = np.hypot(*(track[begin:] - point).T)
+        begin += int(np.argmax(nearest <= passage.acceptance_radius))
+        assert nearest[0] > passage.acceptance_radius or begin > 0
+        assert np.hypot(*(track[begin] - point)) <= passage.acceptance_radius
+    assert [passage[name][-1] for name in COMMANDS] == [0.0, 0.0, 0.0]
+    assert not np.any(passage["port_thruster"] * passage["starboard_thruster"])
+    assert passage.distance > 25.0 * passage.craft.length
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("name", VOYAGES)
+def test_every_voyage_reaches_every_waypoint(name: str, scheme: str) -> None:
+    assert_arrived(sail_bare(name, scheme=scheme, settings=RK4))
+
+
+@pytest.mark.parametrize("wind", [{"wind.x": 0.2}, {"wind.x": -0.2}, {"wind.y": -0.2}])
+def test_from_wherever_the_wind_blows(wind: dict[str, float]) -> None:
+    assert_arrived(sail_bare(Voyage("any", "", wind), settings=RK4))
+
+
+def test_heavy_and_light_with_their_inertia_in_the_wind() -> None:
+    for share in (0.5, 2.0):
+        craft = {"mass": 100.0 * share, "inertia": 500.0 * share, "wind.y": 0.2}
+        assert_arrived(sail_bare(Voyage("any", "", craft), settings=RK4))
+
+
+def test_the_native_hovercraft_arrives(native_fmu: Path, autopilot: Path) -> None:
+    assert_arrived(sail("crosswind", native_fmu, autopilot))
+
+
+# ---- it is the bare functions'
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("name", VOYAGES)
+def test_the_fmus_give_the_bits_of_the_bare_functions(
+    name: str, scheme: str, each_fmi_2_fmu: Path, fmu: Path, autopilot: Path
+) -> None:
+    """Past the first waypoint. The native hovercraft has its own sine and cosine, whose last bits may be others."""
+    passage = sail(name, each_fmi_2_fmu, autopilot, scheme=scheme, stop_time=340.0)
+    bare = sail_bare(name, scheme=scheme, stop_time=340.0)
+    assert passage["waypoint"][-1] == 2.0
+    if each_fmi_2_fmu == fmu:
+        assert (passage.data == bare.data).all()
+    else:
+        for column in COLUMNS:
+            assert passage[column] == pytest.approx(bare[column], rel=1e-9, abs=1e-9)
+
+
+def test_a_craft_that_starts_elsewhere(fmu: Path, autopilot: Path) -> None:
+    """The first leg begins where the craft is, in both."""
+    there = Voyage("there", "", {"pose.x": 40.0, "pose.y": -20.0, "pose.heading": 2.0, "velocity.x": -0.1})
+    passage, bare = sail(there, fmu, autopilot, stop_time=50.0), sail_bare(there, stop_time=50.0)
+    assert (passage.data == bare.data).all()
+    assert passage["cross_track_error"][0] == 0.0
+    assert passage["distance"][0] == math.hypot(60.0, 20.0)
+
+
+def test_what_cannot_be_is_refused(fmu: Path, native3_fmu: Path, autopilot: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="voyage = 'nix': must be one of calm, half_mass, double_mass, crosswind"):
+        sail("nix", fmu, autopilot)
+    with pytest.raises(ValueError, match="scheme = 'nix': must be one of jacobi, gauss_seidel"):
+        sail("calm", fmu, autopilot, scheme="nix")
+    for step in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(
+            ValueError, match=f"communication_step = {step!r} s: must be a finite number greater than 0"
+        ):
+            sail("calm", fmu, autopilot, communication_step=step)
+    for end in (0.0, math.nan):
+        with pytest.raises(ValueError, match=f"stop_time = {end!r} s: must be a finite number greater than 0"):
+            sail("calm", fmu, autopilot, stop_time=end)
+    with pytest.raises(
+        ValueError, match=r"Autopilot\.fmu: is an FMU of the model 'Autopilot': must be of 'Hovercraft'"
+    ):
+        sail("calm", autopilot, fmu)
+    with pytest.raises(ValueError, match=r"step_size = 0\.1: must be one of mass, inertia"):
+        sail_bare(Voyage("bad", "", {"step_size": 0.1}))
+    with pytest.raises(ValueError, match=r"HovercraftNative3\.fmu: must be an FMU for co-simulation, FMI 2\.0"):
+        sail("calm", native3_fmu, autopilot)
+    with pytest.raises(
+        FileNotFoundError, match=r"nix\.fmu: no such FMU; 'hovercraft-fmu build --ssp' writes build/Autopilot"
+    ):
+        sail("calm", fmu, tmp_path / "nix.fmu")
+    with pytest.raises(SimulationError, match=r"mass = -1.0: must be greater than 0"):
+        sail(Voyage("bad", "", {"mass": -1.0}), fmu, autopilot)
+    with pytest.raises(ValueError, match=r"column = 'nix': must be one of time, pose.x"):
+        sail_bare("calm", stop_time=1.0)["nix"]
+
+
+# ---- what the communication step costs
+
+
+def test_both_schemes_are_of_first_order() -> None:
+    """Against the loop without a communication step, which another solver knows to 1e-9 m."""
+    exact, uncertainty = study.continuous()
+    assert uncertainty < 1e-9
+    steps = (0.1, 0.2, 0.5)
+    errors = {
+        scheme: [float(np.hypot(*(study.sampled(scheme, step) - exact).T).max()) for step in steps]
+        for scheme in SCHEMES
+    }
+    for scheme in SCHEMES:
+        assert np.polyfit(np.log(steps), np.log(errors[scheme]), 1)[0] == pytest.approx(1.0, abs=0.05)
+    assert all(late > 1.5 * soon for late, soon in zip(errors[JACOBI], errors[GAUSS_SEIDEL], strict=True))
+
+
+@pytest.mark.once
+def test_the_command_writes_what_is_committed(tmp_path: Path) -> None:
+    done = CliRunner().invoke(commands, ["coupling", "--output", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "order in the communication step: jacobi 1.0" in done.output
+    for name in ("coupling.csv", "coupling_course.csv"):
+        ours, committed = (
+            list(csv.reader((folder / name).read_text(encoding="utf-8").splitlines())) for folder in (tmp_path, RESULTS)
+        )
+        assert [row[:-1] for row in ours] == [row[:-1] for row in committed]
+        for row, before in zip(ours[1:], committed[1:], strict=True):
+            if "never" not in row:  # a craft that has lost its way may be anywhere
+                assert float(row[-1]) == pytest.approx(float(before[-1]), rel=0.02), row
+    assert (tmp_path / "coupling.png").stat().st_size > 10000
+
+
+# ---- other masters
+
+
+class FirstZeros:
+    """A part that shows zeros before its first step, whatever it really shows: what fmpy.ssp makes of a part."""
+
+    def __init__(self, part: Part) -> None:
+        self.part, self.first = part, True
+        self.write, self.step = part.write, part.step
+
+    def read(self) -> Sequence[float]:
+        values, self.first = [0.0] * len(self.part.read()) if self.first else self.part.read(), False
+        return values
+
+
+def rows_of(shown: Sequence[Sequence[float]]) -> list[list[float]]:
+    """STATES and COMMANDS after every step."""
+    return [[float(value) for value in row[: len(STATES) + len(COMMANDS)]] for row in shown[1:]]
+
+
+@pytest.fixture(scope="module")
+def expected(each_fmi_2_fmu: Path, autopilot: Path) -> dict[str, list[list[float]]]:
+    """What our own master gives, by scheme."""
+    columns = (*STATES, *COMMANDS)
+    found = {}
+    for scheme in SCHEMES:
+        passage = sail(VOYAGE, each_fmi_2_fmu, autopilot, scheme=scheme, stop_time=STEPS * STEP)
+        assert passage["waypoint"][-1] == 2.0
+        found[scheme] = [[float(row[name]) for name in columns] for row in passage.data[1:]]
+    return found
+
+
+def scheme_of(name: str) -> str:
+    return GAUSS_SEIDEL if name.endswith("sequential") else JACOBI
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("name", LOOPS)
+def test_every_master_gives_the_bits_of_ours(
+    name: str, each_fmi_2_fmu: Path, autopilot: Path, expected: dict[str, list[list[float]]], tmp_path: Path, fmu: Path
+) -> None:
+    if missing := HOSTS[name.split(",")[0].split(".")[0]].missing():
+        pytest.skip(f"{name}: {missing}")
+    rows = loop_in(name, each_fmi_2_fmu, autopilot, tmp_path)
+    assert len(rows) == STEPS
+    if name != "fmpy.ssp":
+        assert rows == expected[scheme_of(name)]
+        return
+    # fmpy.ssp sets every input to zero in its first step: then it is Jacobi
+    craft = BareCraft(VOYAGE, Settings())
+    pilot = BareAutopilot(craft.state)
+    shown = [row for _, row in master(FirstZeros(craft), FirstZeros(pilot), JACOBI, STEP, STEPS)]
+    if each_fmi_2_fmu == fmu:
+        assert rows == rows_of(shown)
+    else:
+        assert np.array(rows) == pytest.approx(np.array(rows_of(shown)), rel=1e-9, abs=1e-9)
+    assert rows[0] != expected[JACOBI][0]
+
+
+# ---- SSP
+
+
+def test_the_ssp_is_valid_whole_and_the_same_every_time(each_fmi_2_fmu: Path, autopilot: Path, tmp_path: Path) -> None:
+    path = build_ssp(tmp_path / "Loop.ssp", each_fmi_2_fmu, autopilot)
+    again = build_ssp(tmp_path / "again" / "Loop.ssp", each_fmi_2_fmu, autopilot)
+    assert hashlib.sha256(path.read_bytes()).digest() == hashlib.sha256(again.read_bytes()).digest()
+    with zipfile.ZipFile(path) as archive:
+        fmus = [f"resources/{each_fmi_2_fmu.name}", "resources/Autopilot.fmu"]
+        assert sorted(archive.namelist()) == sorted(["SystemStructure.ssd", "resources/hovercraft.ssv", *fmus])
+        assert archive.read(fmus[0]) == each_fmi_2_fmu.read_bytes()
+        structure = etree.fromstring(archive.read("SystemStructure.ssd"))
+        values = etree.fromstring(archive.read("resources/hovercraft.ssv"))
+    etree.XMLSchema(file=str(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(structure)
+    etree.XMLSchema(file=str(SCHEMAS / "SystemStructureParameterValues.xsd")).assertValid(values)
+    assert structure.get("version") == "1.0"
+    kinds = structure.xpath("//*[local-name() = 'Annotation']/@type")
+    assert sorted(kinds) == ["com.opensimulationplatform", "org.openmodelica"]
+    assert structure.xpath("//@baseStepSize | //@stepSize") == ["0.5", "0.5"]
+    assert len(structure.xpath("//*[local-name() = 'Connection']")) == len(STATES) + len(COMMANDS)
+    assert values.xpath("//@value") == ["0.2"]
+    with pytest.raises(ValueError, match=r"must end in \.ssp"):
+        build_ssp(tmp_path / "Loop.zip", each_fmi_2_fmu, autopilot)
+
+
+# ---- the commands
+
+
+def test_the_demo_of_the_loop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(commands, ["demo", "--loop"])
+    assert done.exit_code == 0, done.output
+    assert "waypoints reached  6 of 6" in done.output
+    with Image.open("build/demo/loop.png") as picture:
+        assert picture.size == (1440, 810)
+    assert Path("build/demo/loop.csv").read_text().startswith('"time","pose.x"')

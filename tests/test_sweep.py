@@ -1,0 +1,730 @@
+"""Sweeps: a run of one has the bits of `simulate`, whoever makes it, when and beside what."""
+
+import contextlib
+import itertools
+import json
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from hovercraft_fmu import simulate
+from hovercraft_fmu.cli import main
+from hovercraft_fmu.fmu.interface import STEP_UNSTABLE
+from hovercraft_fmu.model.dynamics import Controls
+from hovercraft_fmu.model.integrators import INTEGRATORS, integrator
+from hovercraft_fmu.model.subcycling import Settings, substeps
+from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.sweep import STUDIES, benchmark, load, read_study, sweep
+from hovercraft_fmu.sweep import runner as runner_module
+from hovercraft_fmu.sweep.plots import plot_sweep
+from hovercraft_fmu.sweep.quantities import DERIVED, OBSERVED
+from hovercraft_fmu.sweep.study import Factor
+from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
+from tests.conftest import ROOT
+
+FIXED_STEP = [method.name for method in INTEGRATORS if method.integrate]
+COARSE = {"integrator": "rk4", "step_size": 0.1}
+MASSES: dict[str, Any] = {
+    "scene": "turn",
+    "set": COARSE,
+    "sweep": {"mass": [60.0, 100.0, 170.0], "air_density": [0.3, 1.2]},
+    "keep": {"end": ["pose.x", "pose.y", "speed"]},
+}
+
+
+def but(study: Mapping[str, Any] = MASSES, **changes: Any) -> dict[str, Any]:
+    return {**study, **changes}
+
+
+def rows(table: pa.Table) -> list[dict[str, Any]]:
+    made: list[dict[str, Any]] = table.to_pylist()
+    return made
+
+
+def bits(table: pa.Table) -> pa.Table:
+    """What must be the same: all but the metadata."""
+    return table.replace_schema_metadata(None)
+
+
+# ---- the runs
+
+
+@pytest.mark.parametrize("scene", ["turn", "slalom", "crosswind", "drift_to_rest"])
+def test_a_run_has_the_bits_of_simulate(scene: str, each_fmi_2_fmu: Path, tmp_path: Path) -> None:
+    """At every communication point, whatever was run on the instance before."""
+    study = {
+        "scene": scene,
+        "stop_time": 12.0,
+        "set": {"step_size": 0.01},
+        "sweep": {"mass": [60.0, 170.0], "integrator": [method.name for method in INTEGRATORS]},
+        "keep": {"trajectory": {"every": 0.1, "of": list(OBSERVED)}},
+    }
+    sweep(study, each_fmi_2_fmu, workers=1, output=tmp_path)
+    paths = load(tmp_path, "trajectories")
+    for row in rows(load(tmp_path)):
+        settings = {"step_size": 0.01, "mass": row["mass"], "integrator": row["integrator"]}
+        alone = simulate(scene, each_fmi_2_fmu, start_values=settings, stop_time=12.0)
+        own = paths.filter(pc.equal(paths["run"], row["run"]))
+        for name in ("time", *OBSERVED):
+            assert np.array_equal(own[name].to_numpy(), alone[name]), (row, name)
+
+
+@pytest.mark.parametrize("method", [method.name for method in INTEGRATORS])
+@pytest.mark.parametrize("step_size", [0.1, 0.03])
+def test_what_is_kept_changes_no_bit(method: str, step_size: float, each_fmi_2_fmu: Path, tmp_path: Path) -> None:
+    """Where the end alone is kept communication steps are made as one; the end is the same, what is watched and all."""
+    changed = but(set={"integrator": method, "step_size": step_size})
+    few = {"end": list(OBSERVED)}
+    sweep(but(changed, keep=few), each_fmi_2_fmu, workers=1, output=tmp_path / "few")
+    sweep(but(changed, keep=few | {"distance": True}), each_fmi_2_fmu, workers=1, output=tmp_path / "all")
+    every = load(tmp_path / "all").drop_columns("distance")
+    assert bits(load(tmp_path / "few")).equals(bits(every))
+
+
+def test_how_many_steps_are_left_out() -> None:
+    def legs(scene: str, method: int, step_size: float, **keep: Any) -> int:
+        study = read_study(but(scene=scene, keep=keep))
+        return len(merged(timeline(study.run, study.keep).legs, Settings(step_size, integrator(method))))
+
+    jumps = 10
+    assert legs("turn", 3, 0.1, end=["speed"]) == jumps
+    assert legs("turn", 1, 0.001, end=["speed"]) == jumps
+    assert legs("turn", 3, 0.1, distance=True) == 600
+    assert legs("turn", 3, 0.1, trajectory={"every": 30.0, "of": ["speed"]}) == jumps + 1
+    assert legs("turn", 3, 0.03, end=["speed"]) == 600  # no whole number of sub-steps
+    assert legs("turn", 4, 0.1, end=["speed"]) == 600  # adaptive ends a step at each
+    assert legs("slalom", 3, 0.1, end=["speed"]) == 600  # the controls change all the time
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 40), st.booleans(), st.integers(0, 1)), min_size=1, max_size=30),
+    st.sampled_from([0.1, 0.025, 0.004, 1.0, 0.03]),
+    st.integers(1, 4),
+)
+def test_merging_keeps_time_controls_sub_steps_and_what_is_kept(
+    parts: list[tuple[int, bool, int]], step_size: float, method: int
+) -> None:
+    ends = np.cumsum([0, *(n for n, _, _ in parts)])
+    legs = [
+        Leg(ends[i] * 0.1, ends[i + 1] * 0.1, Controls(float(thrust)), kept)
+        for i, (_, kept, thrust) in enumerate(parts)
+    ]
+    settings = Settings(step_size, integrator(method))
+    made = merged(legs, settings)
+    assert [leg.end for leg in made if leg.kept] == [leg.end for leg in legs if leg.kept]
+    assert (made[0].time, made[-1].end) == (legs[0].time, legs[-1].end)
+    assert all(a.end == b.time for a, b in itertools.pairwise(made))
+    for leg in made:
+        inside = [each for each in legs if leg.time <= each.time and each.end <= leg.end]
+        assert {each.controls for each in inside} == {leg.controls}
+        if len(inside) > 1:
+            cuts = [substeps(each.end - each.time, step_size) for each in inside]
+            assert substeps(leg.end - leg.time, step_size) == (sum(n for n, _ in cuts), step_size)
+            assert {h for _, h in cuts} == {step_size}
+
+
+FAILING = but(sweep={"thrust_min": [0.0, 20.0], "velocity.x": [0.0, 1e200, 5.0]}, set=COARSE | {"drag_area": 2})
+"""thrust_min above thrust_max; so fast that the drag overflows; and good ones between them."""
+
+
+def test_a_failed_run_is_a_row_with_its_error(each_fmi_2_fmu: Path, tmp_path: Path) -> None:
+    outcome = sweep(FAILING, each_fmi_2_fmu, workers=1, output=tmp_path)
+    made = rows(load(tmp_path))
+    assert [row["error"] is None for row in made] == [True, False, True, False, False, False]
+    assert (outcome.new, outcome.failed) == (6, 4)
+    assert outcome.error == f"run 1: {made[1]['error']}"
+    assert "must stay a finite number; the step was refused" in made[1]["error"]
+    assert made[3]["error"] == "thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"
+    assert all(made[i][name] is None for i in (1, 3, 4, 5) for name in ("end.pose.x", "end.speed", "warnings"))
+    start = {"integrator": "rk4", "step_size": 0.1, "drag_area": 2, "velocity.x": 5.0}
+    alone = simulate("turn", each_fmi_2_fmu, start_values=start)
+    assert [made[2][f"end.{name}"] for name in ("pose.x", "speed")] == [alone[name][-1] for name in ("pose.x", "speed")]
+
+
+def test_the_order_of_runs_changes_no_bit(each_fmi_2_fmu: Path) -> None:
+    """On one instance; failed ones are among them."""
+    study = read_study(FAILING)
+    job, _ = runner_module._job(study, each_fmi_2_fmu, "fmu")
+    numbers = np.arange(study.runs)
+    try:
+        made = [
+            runner_module.make_chunk(job, 0, order, study.samples(order)).runs.sort_by("run")
+            for order in (numbers, numbers[::-1], numbers[[4, 2, 0, 5, 1, 3]])
+        ]
+    finally:
+        runner_module.release(job.sweep)
+    assert made[0].equals(made[1])
+    assert made[0].equals(made[2])
+
+
+# ---- the batch
+
+
+@pytest.mark.parametrize("scene", ["turn", "slalom", "crosswind"])
+def test_the_batch_is_within_1e_12_of_the_fmu(scene: str, fmu: Path, tmp_path: Path) -> None:
+    """Every method and both areas at once, all that can be kept, at every communication point."""
+    study = {
+        "scene": scene,
+        "stop_time": 15.0,
+        "set": {"step_size": 0.02},
+        "sweep": {"mass": [60.0, 170.0], "integrator": FIXED_STEP, "drag_area": [1, 2], "rotational_drag": [0.0, 0.5]},
+        "keep": {
+            "end": [*OBSERVED, *DERIVED],
+            "trajectory": {"every": 0.1, "of": list(OBSERVED)},
+            "events": {"moves": {"of": "speed", "above": 0.1, "values": ["pose.x"]}},
+        },
+    }
+    sweep(study, fmu, workers=1, output=tmp_path / "fmu")
+    sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
+    for what in ("runs", "trajectories"):
+        ours, theirs = load(tmp_path / "batch", what), load(tmp_path / "fmu", what)
+        assert ours.num_rows == theirs.num_rows
+        for name in theirs.column_names:
+            if pa.types.is_floating(theirs[name].type):
+                found, expected = (each[name].to_numpy() for each in (ours, theirs))
+                assert np.all(np.abs(found - expected) <= 1e-12 * np.maximum(1.0, np.abs(expected))), name
+            else:
+                assert ours[name].equals(theirs[name]), name
+
+
+def test_a_batch_with_friction_comes_to_rest(fmu: Path, tmp_path: Path) -> None:
+    """At and near rest the size of a step is decided anew in every step: held to 1e-9 there."""
+    study = {
+        "scene": "drift_to_rest",
+        "set": {"step_size": 0.05, "integrator": "rk4"},
+        "sweep": {"skirt_friction": [0.0, 0.002, 0.008], "wind.y": [0.0, 0.3]},
+        "keep": {"end": ["pose.x", "pose.y", "pose.heading", "speed"], "maximum": ["speed"], "distance": True},
+    }
+    sweep(study, fmu, workers=1, output=tmp_path / "fmu")
+    sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
+    ours, theirs = load(tmp_path / "batch"), load(tmp_path / "fmu")
+    for name in theirs.column_names[3:-2]:
+        assert ours[name].to_numpy() == pytest.approx(theirs[name].to_numpy(), rel=1e-9, abs=1e-9)
+
+
+def test_a_failed_craft_of_a_batch_leaves_the_others(tmp_path: Path) -> None:
+    sweep(FAILING, engine="batch", workers=1, output=tmp_path)
+    made = rows(load(tmp_path))
+    assert [row["error"] is None for row in made] == [True, False, True, False, False, False]
+    assert "must stay a finite number" in made[1]["error"]
+    assert made[3]["error"] == "thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"
+    good = but(FAILING, sweep={"thrust_min": [0.0], "velocity.x": [0.0, 5.0]})
+    sweep(good, engine="batch", workers=1, output=tmp_path / "good")
+    assert [row["end.pose.x"] for row in rows(load(tmp_path / "good"))] == [
+        made[0]["end.pose.x"],
+        made[2]["end.pose.x"],
+    ]
+
+
+def test_the_batch_warns_as_the_fmu_does(fmu: Path, tmp_path: Path) -> None:
+    study = but(
+        set=COARSE | {"drag_center_fraction": 0.0},
+        sweep={"velocity.x": [0.0, 30.0], "velocity.yaw_rate": [0.0, -9.0], "thrust_max": [7.0, 12.0]},
+    )
+    sweep(study, fmu, workers=1, output=tmp_path / "fmu")
+    outcome = sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
+    theirs = load(tmp_path / "fmu")["warnings"].to_pylist()
+    assert load(tmp_path / "batch")["warnings"].to_pylist() == theirs
+    assert len(set(theirs)) > 3
+    assert any(each & STEP_UNSTABLE for each in theirs)
+    assert outcome.warned == sum(each != 0 for each in theirs)
+
+
+def test_adaptive_cannot_go_as_a_batch() -> None:
+    for study in (but(set={"integrator": "adaptive"}), but(sweep={"integrator": ["rk4", "adaptive"]}, set={})):
+        with pytest.raises(ValueError, match="integrator = 'adaptive': must be another one with the engine batch"):
+            sweep(study, engine="batch")
+
+
+# ---- what is kept, and what is swept
+
+
+def test_what_is_kept_is_what_the_closed_form_says(tmp_path: Path) -> None:
+    """A launch: v = v_t*tanh(t/tau), x = v_t*tau*ln(cosh(t/tau)); thrust 5 N, so v_t = sqrt(T/k), tau = m*v_t/T."""
+    study = {
+        "scene": "launch",
+        "set": {"integrator": "rk4", "step_size": 0.02},
+        "communication_step": 0.02,
+        "sweep": {"mass": {"from": 50.0, "to": 200.0, "count": 4}},
+        "keep": {
+            "end": ["drift_angle", "turning_radius"],
+            "maximum": ["acceleration.x"],
+            "minimum": ["speed"],
+            "distance": True,
+            "events": {
+                "half": {"of": "speed", "above": 0.5 * math.sqrt(5.0 / 57.421875), "values": ["pose.x"]},
+                "at_once": {"of": "pose.x", "below": 1.0},
+                "never": {"of": "pose.y", "above": 1.0, "values": ["speed"]},
+            },
+        },
+    }
+    sweep(study, engine="batch", workers=1, output=tmp_path)
+    terminal = math.sqrt(5.0 / 57.421875)
+    for row, mass in zip(rows(load(tmp_path)), (50.0, 100.0, 150.0, 200.0), strict=True):
+        tau = mass * terminal / 5.0
+        assert row["mass"] == mass
+        assert row["distance"] == pytest.approx(terminal * tau * math.log(math.cosh(60.0 / tau)), rel=1e-9)
+        # linear in a step of 0.02 s: the error is at most v''*h^2/8 over the slope
+        assert row["half.time"] == pytest.approx(tau * math.atanh(0.5), abs=0.02**2 / tau)
+        assert row["half.pose.x"] == pytest.approx(terminal * tau * math.log(math.cosh(math.atanh(0.5))), abs=1e-4)
+        assert (row["at_once.time"], row["never.time"], row["never.speed"]) == (0.0, None, None)
+        assert row["maximum.acceleration.x"] == 5.0 / mass
+        assert (row["minimum.speed"], row["end.drift_angle"], row["end.turning_radius"]) == (0.0, 0.0, math.inf)
+
+
+def test_the_study_of_turning_circles_obeys_newton(tmp_path: Path) -> None:
+    """A steady turn: no moment, so the drag's is that of the thruster, x_d*Y = -L/2*side; and m*r*u = Y + side.
+
+    With x_d = f*L: m*r*u = side*(1 - 1/(2f)), whatever the density; there r*u = (speed/radius)*speed*cos(drift).
+    """
+    assert STUDIES == ("turning_circle",)
+    whole = read_study("turning_circle")
+    assert whole.runs == 775
+    few = (Factor("drag_center_fraction", (-0.4, -0.25, -0.1)), Factor("air_density", (0.3, 1.5)))
+    keep = replace(whole.keep, end=("turning_radius", "drift_angle", "speed", "body.surge", "velocity.yaw_rate"))
+    sweep(replace(whole, factors=few, keep=keep, runs=6), engine="batch", workers=1, output=tmp_path)
+    side, mass = 0.2 * 3.0, 100.0
+    made = rows(load(tmp_path))
+    for row in made:
+        f = row["drag_center_fraction"]
+        turn = row["end.speed"] ** 2 / row["end.turning_radius"] * math.cos(row["end.drift_angle"])
+        assert turn == pytest.approx(side * (1.0 - 1.0 / (2.0 * f)) / mass, rel=1e-4)
+        assert row["end.velocity.yaw_rate"] * row["end.body.surge"] == pytest.approx(turn, rel=1e-12)
+    radius = {(row["drag_center_fraction"], row["air_density"]): row["end.turning_radius"] for row in made}
+    assert radius[-0.4, 0.3] > radius[-0.25, 0.3] > radius[-0.1, 0.3]
+    assert all(radius[f, 0.3] > 3.0 * radius[f, 1.5] for f in (-0.4, -0.25, -0.1))
+
+
+@given(st.integers(1, 200), st.integers(0, 2**32), st.sampled_from(["linear", "log"]))
+def test_a_latin_hypercube_has_one_run_in_every_stratum(runs: int, seed: int, scale: str) -> None:
+    study = but(
+        sweep={"mass": {"from": 50.0, "to": 200.0, "scale": scale}, "inertia": {"normal": [500.0, 20.0]},
+               "drag_area": ["constant", "directional"]},
+        sampling={"method": "latin_hypercube", "runs": runs, "seed": seed},
+    )  # fmt: skip
+    numbers = np.arange(runs)
+    drawn = read_study(study).samples(numbers)
+    mass = (
+        (lambda m: np.log(m / 50.0) / np.log(4.0))(drawn["mass"]) if scale == "log" else (drawn["mass"] - 50.0) / 150.0
+    )
+    normal = np.array([0.5 * (1.0 + math.erf((each - 500.0) / 20.0 / math.sqrt(2.0))) for each in drawn["inertia"]])
+    for part in (mass, normal):
+        assert sorted(np.floor(part * runs * (1.0 - 1e-12)).astype(int)) == list(numbers)
+    assert abs(np.count_nonzero(drawn["drag_area"] == 1) - runs / 2) <= 1.0
+    # a run's parameters follow from its number alone
+    again = read_study(study).samples(numbers[::-1])
+    assert all(np.array_equal(again[name][::-1], drawn[name]) for name in drawn)
+
+
+def test_distributions_have_their_quantiles() -> None:
+    study = but(
+        sweep={"mass": {"lognormal": [100.0, 0.2]}, "inertia": {"triangular": [400.0, 500.0, 700.0]}},
+        sampling={"method": "latin_hypercube", "runs": 20000, "seed": 3},
+    )
+    drawn = read_study(study).samples(np.arange(20000))
+    assert np.median(drawn["mass"]) == pytest.approx(100.0, rel=1e-3)
+    assert np.std(np.log(drawn["mass"])) == pytest.approx(0.2, rel=1e-3)
+    assert np.mean(drawn["inertia"]) == pytest.approx((400.0 + 500.0 + 700.0) / 3.0, rel=1e-4)
+    assert 400.0 <= drawn["inertia"].min() < drawn["inertia"].max() <= 700.0
+
+
+def test_a_grid_is_every_combination() -> None:
+    drawn = read_study(MASSES).samples(np.arange(6))
+    assert list(zip(*drawn.values(), strict=True)) == [(m, d) for m in (60.0, 100.0, 170.0) for d in (0.3, 1.2)]
+
+
+RANGE = {"from": 50.0, "to": 200.0}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"frob": 3}, "frob = 3: the key must be one of scene, inputs, preset"),
+        ({"inputs": "log.csv"}, "scene: must be given, or else inputs"),
+        ({"scene": "nix"}, "scene = 'nix': must be one of launch"),
+        ({"scene": 3}, "scene = 3: must be text"),
+        ({"scene": "log.csv"}, "must be the name of a scene; a control log is given as inputs"),
+        ({"preset": "moon"}, "preset = 'moon': must be one of textbook, ice"),
+        ({"stop_time": "soon"}, "stop_time = 'soon': must be a finite number"),
+        ({"stop_time": 0}, "stop_time = 0.0 s: must be after start_time = 0.0 s"),
+        ({"set": {"frob": 3}}, "set.frob = 3: must be a variable that can be set: thrust"),
+        ({"set": {"mass": -3}}, "set.mass = -3.0: must be greater than 0"),
+        ({"set": {"mass": True}}, "set.mass = True: must be a"),
+        ({"set": {"integrator": 1.5}}, "set.integrator = 1.5: must be a whole number or a name"),
+        ({"set": {"integrator": "magic"}}, "set.integrator = 'magic': must be one of semi_implicit_euler"),
+        ({"set": {"step_size": 0.0}}, "set.step_size = 0.0 s: must be a finite number greater than 0"),
+        ({"set": {"mass": 90}}, "set.mass = 90: must not be swept, too"),
+        ({"set": 3}, "set = 3: must be a table"),
+        ({"sweep": {}}, "sweep: must have at least one parameter"),
+        ({"sweep": {"mass": []}}, "sweep.mass = []: must have at least one value"),
+        ({"sweep": {"mass": 3}}, "sweep.mass = 3: must be a list of values, a range or a distribution"),
+        ({"sweep": {"mass": [1.0, 0.0]}}, "sweep.mass = 0.0: must be greater than 0"),
+        ({"sweep": {"mass": [1.0, math.nan]}}, "sweep.mass = nan: must be a finite number"),
+        ({"sweep": {"speed": [1.0]}}, "sweep.speed = 1.0: must be a variable that can be set"),
+        ({"sweep": {"frob": RANGE}}, "must be a variable that can be set"),
+        ({"sweep": {"thrust": [1.0]}}, "must be an input that turn leaves alone"),
+        ({"sweep": {"integrator": RANGE}}, "must be a list of values: the variable is no real number"),
+        ({"sweep": {"mass": {"from": 50.0, "count": 3}}}, "sweep.mass.to: must be given"),
+        ({"sweep": {"mass": {"from": 50.0, "to": 40, "count": 3}}}, "sweep.mass.to = 40.0: must be above from = 50.0"),
+        ({"sweep": {"mass": {"from": 0.0, "to": 40.0, "count": 3}}}, "sweep.mass = 0.0: must be greater than 0"),
+        ({"sweep": {"mass": RANGE | {"count": 1}}}, "sweep.mass.count = 1: must be a whole number from 2"),
+        ({"sweep": {"mass": RANGE | {"scale": "odd"}}}, "sweep.mass.scale = 'odd': must be linear or log"),
+        ({"sweep": {"mass": RANGE | {"step": 1}}}, "sweep.mass.step = 1: the key must be one of from, to, count"),
+        ({"sweep": {"mass": RANGE}}, "sweep.mass: must be a list, or a range with a count, where sampling"),
+        ({"sweep": {"mass": {"normal": [1.0]}}}, "sweep.mass.normal = [1.0]: must be a list of mean, standard"),
+        ({"sweep": {"mass": {"normal": [1.0, 0.0]}}}, "the standard deviation must be greater than 0"),
+        ({"sweep": {"mass": {"triangular": [3, 2, 4]}}}, "sweep.mass.triangular = [3, 2, 4]: must rise"),
+        ({"sampling": {"method": "luck"}}, "sampling.method = 'luck': must be one of grid, latin_hypercube"),
+        ({"sampling": {"runs": 3}}, "sampling.runs = 3: the key must be one of method"),
+        ({"sampling": {"method": "latin_hypercube", "seed": 1}}, "sampling.runs = None: must be a whole number from 1"),
+        ({"sampling": {"method": "latin_hypercube", "runs": 9}}, "sampling.seed = None: must be a whole number from 0"),
+        ({"sampling": {"method": "latin_hypercube", "runs": 10**9, "seed": 1}}, "must not be more than 100000000"),
+        ({"keep": {}}, "keep: must name what to keep"),
+        ({"keep": {"end": ["mass"]}}, "keep.end = 'mass': must be one of pose.x"),
+        ({"keep": {"end": "speed"}}, "keep.end = 'speed': must be a list of names, each once"),
+        ({"keep": {"distance": 1}}, "keep.distance = 1: must be true or false"),
+        ({"keep": {"events": {"a": {"of": "speed"}}}}, "keep.events.a: must have above or below, one of them"),
+        ({"keep": {"events": {"a": {"above": 1.0}}}}, "keep.events.a.of = None: must be one of"),
+        ({"keep": {"trajectory": {"every": 0.25, "of": ["speed"]}}},
+         "keep.trajectory.every = 0.25 s: must be a whole number of communication steps of 0.1 s"),
+        ({"keep": {"trajectory": {"every": 0.5}}}, "keep.trajectory.of = None: must be a list of names"),
+    ],
+)  # fmt: skip
+def test_a_bad_study_gets_one_clear_line(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 - the message is compared below
+        read_study(but(**changes))
+    assert message in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_study_in_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "blown.toml"
+    file.write_text(
+        'inputs = "log.csv"\nstop_time = 5\nset.wind.x = 0.1\nsweep.wind.y = [0.1, 0.2]\nkeep.end = ["speed"]\n'
+    )
+    with pytest.raises(OSError, match=r"log\.csv"):
+        read_study(file)
+    (tmp_path / "log.csv").write_text("time,thrust\n0,5\n10,5\n")
+    study = read_study(file)
+    assert (study.name, study.runs, study.run.stop_time) == ("blown", 2, 5.0)
+    assert study.factors[0].values == (0.1, 0.2)
+    assert set(study.run.signals["wind.x"]) == {0.1}
+    (tmp_path / "log.csv").write_text("time,thrust\n0,6\n10,6\n")
+    assert read_study(file).content != study.content  # other inputs, another study
+    for text, message in (("scene = ", "must be a TOML file"), ('scene = "nix"', "scene = 'nix': must be one of")):
+        file.write_text(text)
+        with pytest.raises(ValueError, match=r"blown\.toml: ") as caught:
+            read_study(file)
+        assert message in str(caught.value)
+    with pytest.raises(FileNotFoundError):
+        read_study(tmp_path / "nix.toml")
+
+
+# ---- the store
+
+
+def test_the_metadata_tells_where_the_rows_come_from(fmu: Path, tmp_path: Path) -> None:
+    import hashlib
+
+    sweep(MASSES, fmu, workers=1, output=tmp_path)
+    about = json.loads(load(tmp_path).schema.metadata[b"hovercraft_fmu"])
+    assert json.loads(about["study"]) == MASSES
+    assert about["fmu_sha256"] == hashlib.sha256(fmu.read_bytes()).hexdigest()
+    assert {"python", "numpy", "scipy", "pyarrow", "dask"} == about["versions"].keys()
+    # any one file is plain Parquet, and says the same
+    assert json.loads(pq.read_schema(next((tmp_path / "runs").glob("*.parquet"))).metadata[b"hovercraft_fmu"]) == about
+
+
+def test_a_sweep_goes_on_only_as_it_began(fmu: Path, native_fmu: Path, tmp_path: Path) -> None:
+    assert sweep(MASSES, fmu, workers=1, output=tmp_path).new == 6
+    assert sweep(MASSES, fmu, workers=1, output=tmp_path).new == 0
+    with pytest.raises(ValueError, match=r"holds the results of another sweep \(study differ\)"):
+        sweep(but(set={}), fmu, workers=1, output=tmp_path)
+    with pytest.raises(ValueError, match=r"\(fmu_sha256 differ\)"):
+        sweep(MASSES, native_fmu, workers=1, output=tmp_path)
+    with pytest.raises(ValueError, match=r"\(engine, fmu_sha256, chunk differ\)"):
+        sweep(MASSES, engine="batch", workers=1, output=tmp_path)
+    before = load(tmp_path)
+    (tmp_path / "runs" / "00003.parquet").unlink()
+    with pytest.raises(ValueError, match="5 of 6 chunks are there: finish it with the same command"):
+        load(tmp_path)
+    assert sweep(MASSES, fmu, workers=1, output=tmp_path).new == 1
+    assert load(tmp_path).equals(before)
+    with pytest.raises(ValueError, match="the sweep kept no trajectories"):
+        load(tmp_path, "trajectories")
+    with pytest.raises(FileNotFoundError, match="no sweep is there"):
+        load(tmp_path / "nix")
+
+
+KILLED = """
+import json, sys
+from hovercraft_fmu.sweep import sweep
+sweep(json.loads(sys.argv[1]), sys.argv[2], workers=1, output=sys.argv[3])
+"""
+
+
+def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> None:
+    study = but(
+        sweep={"mass": RANGE},
+        sampling={"method": "latin_hypercube", "runs": 96, "seed": 1},
+        keep={"distance": True, "trajectory": {"every": 30.0, "of": ["pose.x", "pose.y"]}},
+    )
+    there = tmp_path / "killed" / "runs"
+    command = [sys.executable, "-W", "error", "-c", KILLED, json.dumps(study), str(fmu), str(tmp_path / "killed")]
+    process = subprocess.Popen(command)
+    while len(list(there.glob("*.parquet"))) < 2:
+        assert process.poll() is None
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    made = len(list(there.glob("*.parquet")))
+    assert 2 <= made < 32
+    kept = {path: path.stat().st_mtime_ns for path in there.glob("*.parquet")}
+    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 96 - 3 * made
+    assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
+    sweep(study, fmu, workers=1, output=tmp_path / "whole")
+    for what in ("runs", "trajectories"):
+        assert load(tmp_path / "killed", what).equals(load(tmp_path / "whole", what))
+
+
+@pytest.mark.parametrize("engine", ["fmu", "batch"])
+def test_a_chunk_has_a_bounded_size(engine: str, fmu: Path) -> None:
+    many = {"method": "latin_hypercube", "runs": 100000, "seed": 1}
+    for keep in ({"end": ["speed"]}, {"maximum": list(OBSERVED)}):
+        study = read_study(but(sweep={"mass": RANGE}, sampling=many, keep=keep))
+        job, about = runner_module._job(study, fmu if engine == "fmu" else None, engine)
+        values = about["chunk"] * len(job.plan.timeline.times) * len(study.keep.read)
+        assert about["chunk"] <= runner_module.MOST_RUNS[engine]
+        assert values <= runner_module.MOST_VALUES
+
+
+# ---- on workers
+
+
+@pytest.mark.once
+def test_the_bits_do_not_depend_on_who_makes_the_runs(each_fmi_2_fmu: Path, tmp_path: Path) -> None:
+    """In this process; on two processes of a cluster on loopback, which get the FMU by content: its file is gone."""
+    import distributed
+
+    study = but(FAILING, keep={"distance": True, "trajectory": {"every": 15.0, "of": ["pose.x"]}})
+    sweep(study, each_fmi_2_fmu, workers=1, output=tmp_path / "here")
+    copy = tmp_path / "copy.fmu"
+    copy.write_bytes(each_fmi_2_fmu.read_bytes())
+    cluster = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1"}
+    with distributed.LocalCluster(**cluster, dashboard_address="127.0.0.1:0") as there:
+        address = there.scheduler_address
+        outcome = sweep(
+            study, copy, scheduler=address, output=tmp_path / "there", tell=lambda _: copy.unlink(missing_ok=True)
+        )
+        assert not copy.exists()
+        with distributed.Client(address, set_as_default=False) as client:
+            left = client.run(_drivers)
+            assert list(left.values()) == [0, 0]  # every instance was freed
+    assert (outcome.new, outcome.failed) == (6, 4)
+    for what in ("runs", "trajectories"):
+        here = bits(load(tmp_path / "here", what))
+        assert bits(load(tmp_path / "there", what)).equals(here)
+
+
+def _drivers() -> int:
+    return len(runner_module.DRIVERS)
+
+
+@pytest.mark.once
+def test_two_workers_of_this_machine_give_the_bits_of_one(tmp_path: Path) -> None:
+    """With the batch, too."""
+    study = but(sweep={"mass": RANGE}, sampling={"method": "latin_hypercube", "runs": 300, "seed": 1})
+    for workers in (1, 2):
+        sweep(study, engine="batch", workers=workers, output=tmp_path / str(workers))
+    assert load(tmp_path / "1").equals(load(tmp_path / "2"))
+
+
+@pytest.mark.once
+def test_nothing_listens_to_other_machines(fmu: Path, tmp_path: Path) -> None:
+    """Nor does a port that is taken matter: dask's own is here."""
+    addresses: set[str] = set()
+
+    def look(_: int) -> None:
+        processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+        found = [one.laddr.ip for each in processes for one in each.net_connections() if one.status == "LISTEN"]
+        addresses.update(found)
+
+    with socket.socket() as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with contextlib.suppress(OSError):  # or another program has it
+            taken.bind(("127.0.0.1", 8787))
+            taken.listen()
+        sweep(MASSES, fmu, workers=2, output=tmp_path, tell=look)
+    assert addresses == {"127.0.0.1"}
+
+
+def test_a_scheduler_that_is_not_there(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner_module, "CONNECT", 0.5)
+    with pytest.raises(OSError, match=r"127\.0\.0\.1:1"):
+        sweep(MASSES, fmu, scheduler="tcp://127.0.0.1:1", output=tmp_path)
+    with pytest.raises(ValueError, match="scheduler = 'nonsense': must be an address as tcp://"):
+        sweep(MASSES, fmu, scheduler="nonsense", output=tmp_path)
+
+
+def test_an_fmu_of_fmi_3_is_refused(tmp_path: Path, native3_fmu: Path) -> None:
+    with pytest.raises(ValueError, match=r"HovercraftNative3\.fmu: must be an FMU for co-simulation, FMI 2\.0"):
+        sweep(MASSES, native3_fmu, workers=1, output=tmp_path)
+
+
+def test_bad_arguments(tmp_path: Path, fmu: Path) -> None:
+    for options, message in (
+        ({"engine": "steam"}, "engine = 'steam': must be one of fmu, batch"),
+        ({"workers": 0}, "workers = 0: must be at least 1"),
+        ({"workers": 2, "scheduler": "tcp://127.0.0.1:1"}, "workers = 2: must not be given with a scheduler"),
+        ({"engine": "batch"}, "must not be given with the engine batch"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            sweep(MASSES, fmu, output=tmp_path, **options)
+    with pytest.raises(FileNotFoundError, match="no such FMU"):
+        sweep(MASSES, tmp_path / "nix.fmu", output=tmp_path)
+    job, _ = runner_module._job(read_study(MASSES), fmu, "fmu")
+    with pytest.raises(ValueError, match=r"a worker has hovercraft-fmu .*: must be 9\.9"):
+        runner_module.make_chunk(replace(job, version="9.9"), 0, np.arange(1), {})
+
+
+# ---- pictures, the command
+
+
+@pytest.mark.parametrize("kind", ["curve", "map", "cloud", "points", "paths"])
+def test_pictures(kind: str, tmp_path: Path) -> None:
+    latin = {"method": "latin_hypercube", "runs": 12, "seed": 1}
+    two = {"mass": RANGE, "air_density": {"from": 0.3, "to": 1.2}}
+    study = {
+        "curve": but(sweep={"mass": [60.0, 100.0, 170.0]}),
+        "map": MASSES,
+        "cloud": but(sweep=two, sampling=latin),
+        "points": but(sweep=two | {"inertia": {"normal": [500.0, 20.0]}}, sampling=latin),
+        "paths": but(keep={"trajectory": {"every": 1.0, "of": ["pose.x", "pose.y"]}}),
+    }[kind]
+    sweep(study, engine="batch", workers=1, output=tmp_path)
+    with Image.open(plot_sweep(tmp_path, tmp_path / "new" / "plot.png")) as picture:
+        assert len(picture.convert("RGB").getcolors(maxcolors=100000) or []) > 20
+
+
+def command(folder: Path, *arguments: str, env: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", "sweep", *arguments]
+    return subprocess.run(
+        line,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "NO_COLOR": "1", **(env or {})},
+    )
+
+
+STUDY = """
+scene = "turn"
+set.integrator = "rk4"
+set.step_size = 0.1
+sweep.mass = [60, 100, 170]
+sweep.thrust_min = [0, 20]
+keep.end = ["speed"]
+"""
+
+
+def test_the_command(tmp_path: Path) -> None:
+    (tmp_path / "masses.toml").write_text(STUDY)
+    done = command(tmp_path, "masses.toml", "--workers", "1", "--plot", "masses.png")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "build/sweep/masses: 6 runs, 6 of them made now in " in done.stdout
+    assert "3 failed; the first is run 1: thrust_min = 20.0 N: must not be above thrust_max = 10.0 N" in done.stdout
+    assert (tmp_path / "masses.png").stat().st_size > 10000
+    assert "6 runs, 0 of them made now" in command(tmp_path, "masses.toml", "--workers", "1").stdout
+    speeds = load(tmp_path / "build" / "sweep" / "masses")["end.speed"].drop_null().to_pylist()
+    assert len(speeds) == 3
+    shown = next(line.split() for line in done.stdout.splitlines() if line.startswith("end.speed"))
+    assert [shown[1], shown[9]] == [f"{min(speeds):.4g}", f"{max(speeds):.4g}"]
+
+
+def test_what_is_wrong_is_one_clear_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.toml").write_text(STUDY + "frob = 3\n")
+    for arguments, message in (
+        (("nix.toml",), "nix.toml: No such file or directory"),
+        (("bad.toml",), "bad.toml: frob = 3: the key must be one of scene"),
+        ((), "STUDY: must be given"),
+        (("turning_circle", "nix.fmu"), "nix.fmu: no such FMU"),
+        (("turning_circle", "--engine", "steam"), "engine = 'steam': must be one of fmu, batch"),
+    ):
+        with pytest.raises(SystemExit) as left:
+            main(["sweep", *arguments])
+        assert str(left.value).startswith("hovercraft-fmu: ")
+        assert message in str(left.value)
+        assert len(str(left.value).splitlines()) == 1
+    assert capsys.readouterr() == ("", "")
+
+
+def test_without_its_libraries_the_command_says_how_to_get_them(tmp_path: Path) -> None:
+    (tmp_path / "pyarrow.py").write_text("raise ModuleNotFoundError('gone', name='pyarrow')")  # hides the real one
+    done = command(tmp_path, "turning_circle")
+    assert done.returncode == 1
+    assert "sweeps need pyarrow, which is not installed: pip install 'hovercraft-fmu[sweep]'" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.once
+def test_the_benchmark(fmu: Path, native_fmu: Path) -> None:
+    """Every way is measured; no clock is asserted."""
+    ways = dict.fromkeys(case.way for case in benchmark.CASES)
+    measured = benchmark.measure([benchmark.Case(way, benchmark.END, 1, 8) for way in ways], fmu, native_fmu)
+    assert [benchmark.cells(row)[0] for row in measured] == list(ways)
+    assert len(measured) == 4
+    assert measured[0].to_fmpy == 1.0
+    assert all(row.seconds > 0.0 for row in measured)
+    assert benchmark.short(measured) == measured
+
+
+def test_the_readme_shows_what_is_committed() -> None:
+    table = (ROOT / "hovercraft_fmu" / "fmu" / "documentation" / "results" / "sweep.md").read_text(encoding="utf-8")
+    assert table in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_every_scene_can_be_swept() -> None:
+    for name in SCENES:
+        assert read_study(but(scene=name)).runs == 6
+
+
+def test_stopping_is_no_harm(fmu: Path, tmp_path: Path) -> None:
+    """Ctrl-C: one line, and what was made is there."""
+    (tmp_path / "many.toml").write_text(
+        'scene = "turn"\nset.integrator = "rk4"\nset.step_size = 0.1\nkeep.distance = true\n'
+        "sweep.mass = { from = 50, to = 200, count = 600 }\n"
+    )
+    line = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", "sweep"]
+    process = subprocess.Popen(
+        [*line, "many.toml", str(fmu), "--workers", "1"], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
+    there = tmp_path / "build" / "sweep" / "many" / "runs"
+    while not list(there.glob("*.parquet")):
+        assert process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert (process.returncode, said.strip()) == (1, "hovercraft-fmu: stopped")
+    assert not list(there.glob(".*"))

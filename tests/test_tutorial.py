@@ -1,0 +1,43 @@
+"""The tutorial page inside the FMU promises nothing that does not run."""
+
+import html
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from hovercraft_fmu.fmu.description import NATIVE
+from hovercraft_fmu.fmu.document import pages
+from hovercraft_fmu.hosts import HOSTS
+from hovercraft_fmu.ssp import build_ssp
+from tests.conftest import Fresh
+
+PAGE = pages()["tutorial.html"]
+BLOCKS = [html.unescape(text) for text in re.findall(r'<pre class="python">\n(.*?)</pre>', PAGE, re.DOTALL)]
+PRINTED = (
+    r"end: \(.*\) m",
+    r"200 kg: .* in a minute",
+    r"arrived: True",
+    r"after 500 s: .* off the leg",
+    r"after 120 s",
+)
+
+
+def test_the_parts_are_found() -> None:
+    assert len(BLOCKS) == len(PRINTED)
+    assert 'href="tutorial.html"' in pages()["index.html"]
+    assert 'href="tutorial.html"' in pages(NATIVE)["index.html"]
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("number", range(len(PRINTED)))
+def test_its_code_runs(number: int, fmu: Path, native_fmu: Path, autopilot: Path, fresh: Fresh, tmp_path: Path) -> None:
+    code = BLOCKS[number]
+    if "libcosimpy" in code and (missing := HOSTS["libcosimpy"].missing()):
+        pytest.skip(missing)
+    (tmp_path / "build").mkdir()
+    for path in (fmu, native_fmu, autopilot):
+        shutil.copy(path, tmp_path / "build" / path.name)
+    build_ssp(tmp_path / "build" / "HovercraftLoop.ssp", fmu, autopilot)
+    assert re.search(PRINTED[number], fresh(code))
