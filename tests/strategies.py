@@ -26,6 +26,10 @@ ANY_CRAFT = {
 DRAG_TERMS = {"drag_area": st.sampled_from([1, 2]), "rotational_drag": numbers(0.0, 1.0)}
 crafts = st.one_of(st.builds(Craft, **ANY_CRAFT), st.builds(Craft, **ANY_CRAFT, **DRAG_TERMS))
 """Without friction, which is not a load like others."""
+rubbing_crafts = st.builds(
+    Craft, **ANY_CRAFT, **DRAG_TERMS, skirt_friction=numbers(1e-3, 0.5), gravity=numbers(0.0, 30.0)
+)
+"""With every term of a scene."""
 CALM = {
     **ANY_CRAFT,
     "mass": numbers(100.0, 1e5),

@@ -45,12 +45,15 @@ from hovercraft_fmu.trade.reference import reference_end
 from hovercraft_fmu.trade.work_precision import STOP_TIME
 from tests.conftest import FMI_2
 from tests.lowlevel import CONTINUOUS, Instance3, count, everything, get, one, put, reference, start, worded
-from tests.strategies import crafts, numbers
+from tests.strategies import crafts, numbers, rubbing_crafts
 from tests.test_lifecycle import FAULTS
 
 ERROR = 3
 UNKNOWNS = (*STATES, *MOTION, *DERIVATIVES[3:])
 KNOWNS = (*STATES, *INPUTS)
+PARAMETERS = tuple(field.name for field in fields(Craft) if BY_NAME[field.name].kind == "Real")
+INITIAL_UNKNOWNS = (*MOTION, *DERIVATIVES[3:], "projected_area")
+INITIAL_KNOWNS = (*KNOWNS, *PARAMETERS)
 
 
 @pytest.fixture(scope="module")
@@ -493,10 +496,12 @@ def analytic(value: Any) -> Analytic:
     return np.asarray(value, dtype=complex).view(Analytic)
 
 
-def _clip(value: Any, low: float, high: float) -> Any:
+def _clip(value: Any, low: Any, high: Any) -> Any:
     """A limit is inside, where there is an inside."""
-    x = float(np.real(value))
-    return value if low <= x <= high and low < high else analytic(min(max(x, low), high))
+    x, least, most = (float(np.real(each)) for each in (value, low, high))
+    if least <= x <= most:
+        return value if least < most else analytic(least)
+    return analytic(low if x < least else high)
 
 
 COMPLEX = SimpleNamespace(
@@ -511,25 +516,40 @@ COMPLEX = SimpleNamespace(
 STEP = 1e-200  # its square is 0
 
 
-def by_complex_steps(state: State, held: Controls, craft: Craft) -> NDArray[np.float64]:
+def _model(values: dict[str, Any], drag_area: int) -> dict[str, Any]:
+    """All that can be an unknown, by name, through the bare model; of states, inputs and parameters, by name."""
+    craft = object.__new__(Craft)  # complex numbers would not come through its door
+    vars(craft).update({name: values[name] for name in PARAMETERS}, drag_area=drag_area)
+    state, held = State(*(values[name] for name in STATES)), Controls(*(values[name] for name in INPUTS))
+    loads_at = (sliding_load_function if craft.rubs else load_function)(held, craft, COMPLEX)
+    x, y, moment, _ = loads_at(*state[2:])
+    motion = (*body_velocity(state, COMPLEX), np.sqrt(state.vx * state.vx + state.vy * state.vy))
+    accelerations = (x / craft.mass, y / craft.mass, moment / craft.inertia)
+    found = (*state, *motion, *accelerations, craft.projected_area)
+    return dict(zip((*UNKNOWNS, "projected_area"), found, strict=True))
+
+
+def by_complex_steps(
+    state: State,
+    held: Controls,
+    craft: Craft,
+    unknowns: tuple[str, ...] = UNKNOWNS,
+    knowns: tuple[str, ...] = KNOWNS,
+) -> NDArray[np.float64]:
     """The Jacobian through the bare model (Squire, Trapp, Using complex variables to estimate derivatives, 1998)."""
+    at = dict(zip(KNOWNS, map(analytic, (*state, *held)), strict=True)) | {n: getattr(craft, n) for n in PARAMETERS}
     columns = []
-    for k in range(len(KNOWNS)):
-        values: list[Any] = [
-            analytic(value + (STEP * 1j if i == k else 0.0)) for i, value in enumerate((*state, *held))
-        ]
-        moved, steered = State(*values[:6]), Controls(*values[6:])
-        motion = (*body_velocity(moved, COMPLEX), np.sqrt(moved.vx * moved.vx + moved.vy * moved.vy))
-        loads_at = (sliding_load_function if craft.rubs else load_function)(steered, craft, COMPLEX)
-        x, y, moment, _ = loads_at(*moved[2:])
-        column = (*moved, *motion, x / craft.mass, y / craft.mass, moment / craft.inertia)
-        columns.append([float(np.imag(value)) / STEP for value in column])
+    for known in knowns:
+        found = _model(at | {known: analytic(at[known] + STEP * 1j)}, craft.drag_area)
+        columns.append([float(np.imag(found[name])) / STEP for name in unknowns])
     return np.array(columns).T
 
 
-def jacobian(instance: Any) -> NDArray[np.float64]:
-    unknowns = [reference(name) for name in UNKNOWNS]
-    return np.array([instance.getDirectionalDerivative(unknowns, [reference(name)], [1.0]) for name in KNOWNS]).T
+def jacobian(
+    instance: Any, unknowns: tuple[str, ...] = UNKNOWNS, knowns: tuple[str, ...] = KNOWNS
+) -> NDArray[np.float64]:
+    rows = [reference(name) for name in unknowns]
+    return np.array([instance.getDirectionalDerivative(rows, [reference(name)], [1.0]) for name in knowns]).T
 
 
 def assert_close(found: NDArray[np.float64], expected: NDArray[np.float64]) -> None:
@@ -551,17 +571,8 @@ def test_partial_derivatives_are_those_of_the_model(
     assert_close(jacobian(instance), by_complex_steps(state, held, craft))
 
 
-SLIDING = st.builds(
-    Craft,
-    skirt_friction=numbers(1e-3, 0.5),
-    drag_area=st.sampled_from([1, 2]),
-    rotational_drag=st.sampled_from([0.0, 0.5]),
-    thrust_min=st.just(-10.0),
-)
-
-
 @settings(max_examples=100)
-@given(craft=st.one_of(crafts, SLIDING), state=rounded_states, held=rounded_controls)
+@given(craft=st.one_of(crafts, rubbing_crafts), state=rounded_states, held=rounded_controls)
 def test_partial_derivatives_in_co_simulation(craft: Craft, state: State, held: Controls, stepped: Any) -> None:
     """At a communication point: of what is read there, so with the inputs of the step that led to it."""
     state = state._replace(vx=state.vx or 0.5)
@@ -571,6 +582,67 @@ def test_partial_derivatives_in_co_simulation(craft: Craft, state: State, held: 
     start(stepped, **values)
     put(stepped, thrust=3.0, port_thruster=0.25)  # for the next step
     assert_close(jacobian(stepped), by_complex_steps(state, held, craft))
+
+
+def initialize(instance: Any, state: State, held: Controls, craft: Craft) -> None:
+    """To initialization mode."""
+    instance.reset()
+    put_craft(instance, craft)
+    instance.setReal([reference(name) for name in KNOWNS], [*state, *held])
+    instance.setupExperiment()
+    instance.enterInitializationMode()
+
+
+def assert_initially_close(instance: Any, state: State, held: Controls, craft: Craft) -> None:
+    """Of parameters the change by a whole of each is compared: so that columns are of one size."""
+    expected = by_complex_steps(state, held, craft, INITIAL_UNKNOWNS, INITIAL_KNOWNS)
+    wholes = np.array([1.0] * len(KNOWNS) + [abs(getattr(craft, name)) or 1.0 for name in PARAMETERS])
+    assert_close(jacobian(instance, INITIAL_UNKNOWNS, INITIAL_KNOWNS) * wholes, expected * wholes)
+
+
+@settings(max_examples=100)
+@given(craft=crafts, state=rounded_states, held=rounded_controls)
+def test_partial_derivatives_in_initialization_mode(
+    craft: Craft, state: State, held: Controls, shared: tuple[Any, list[str]]
+) -> None:
+    """Of parameters, too; friction, which is none here, can begin."""
+    state = state._replace(vx=state.vx or 0.5)
+    instance, _ = shared
+    initialize(instance, state, held, craft)
+    assert_initially_close(instance, state, held, craft)
+
+
+@settings(max_examples=100)
+@given(craft=st.one_of(crafts, rubbing_crafts), state=rounded_states, held=rounded_controls)
+def test_partial_derivatives_in_initialization_mode_of_co_simulation(
+    craft: Craft, state: State, held: Controls, stepped: Any
+) -> None:
+    state = state._replace(vx=state.vx or 0.5)
+    initialize(stepped, state, held, craft)
+    assert_initially_close(stepped, state, held, craft)
+
+
+def test_only_initialization_mode_has_parameters_as_knowns(instance: Any, messages: list[str]) -> None:
+    """And the projected area as an unknown, but no state: it is given."""
+    rows, columns = [reference(name) for name in INITIAL_UNKNOWNS], [reference(name) for name in INITIAL_KNOWNS]
+    seeds = list(np.linspace(-1.0, 1.0, len(columns)))
+    _to(instance, "initialization mode")
+    for name in ("step_size", "tolerance"):  # they act on nothing that is read
+        assert instance.getDirectionalDerivative(rows, [reference(name)], [1.0]) == [0.0] * len(rows)
+    found = instance.getDirectionalDerivative(rows, columns, seeds)
+    expected = jacobian(instance, INITIAL_UNKNOWNS, INITIAL_KNOWNS) @ np.array(seeds)
+    assert found == pytest.approx(expected, rel=1e-13, abs=1e-13)
+    for unknown, known, said in (
+        ("pose.x", "mass", "unknown pose.x: must be calculated in initialization mode: one of the InitialUnknowns"),
+        ("force.x", "mass", "unknown force.x: must be calculated in"),
+        ("mass", "mass", "unknown mass: must be calculated in"),
+        ("speed", "speed", "known speed: must be a state, an input or a Real parameter in initialization mode"),
+        ("speed", "drag_area", "known drag_area: must be a state, an input or"),
+        ("speed", "projected_area", "known projected_area: must be a state, an input or"),
+    ):
+        with pytest.raises(FMICallException):
+            partial(instance, unknown, known)
+        assert messages[-1].startswith(worded(instance, f"fmi2GetDirectionalDerivative: {said}"))
 
 
 def test_partial_derivatives_after_a_step(stepped: Any) -> None:

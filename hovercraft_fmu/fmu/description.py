@@ -274,6 +274,16 @@ def _followed(acceleration: str) -> tuple[str, ...]:
     return (*inputs, "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
 
 
+def _followed_initially(acceleration: str) -> tuple[str, ...]:
+    """And of the parameters, too. At rest on ground that rubs each acceleration follows the whole push: the thrust, too,
+    and mass and inertia both; to rotate in air has a moment alone.
+    """
+    parameters = tuple(
+        name for name in CRAFT_PARAMETERS if not (name == "rotational_drag" and acceleration != "acceleration.yaw")
+    )
+    return (*INPUTS, "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate", *parameters)
+
+
 def _structure(parent: Element, flavour: Flavour) -> None:
     # In co-simulation an output belongs to a communication point: it never follows the inputs of that point, so there
     # are no dependencies. Without saying so, masters see algebraic loops that are not there. In model exchange it
@@ -289,7 +299,7 @@ def _structure(parent: Element, flavour: Flavour) -> None:
     if not flavour.exchange:
         outputs, derivatives = dict.fromkeys(outputs, ()), {}
     calculated = {v.name for v in table if v.initial == "calculated"}
-    initial |= {name: others + CRAFT_PARAMETERS for name, others in derivatives.items() if name in calculated}
+    initial |= {name: _followed_initially(name) for name in derivatives if name in calculated}
     _unknowns(parent, "Output", outputs, flavour)
     _unknowns(parent, "Derivative" if flavour.fmi == 2 else "ContinuousStateDerivative", derivatives, flavour)
     _unknowns(parent, "InitialUnknown", initial, flavour)

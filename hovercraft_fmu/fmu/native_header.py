@@ -111,6 +111,7 @@ static const unsigned STATES[] = {{{states}}};
 static const unsigned DERIVATIVES[] = {{{derivatives}}}; /* of STATES */
 static const double NOMINALS[] = {{{nominals}}};         /* of STATES, in their units */
 static const unsigned KNOWNS[] = {{{knowns}}};           /* of linearization.h */
+static const unsigned ROWS[] = {{{rows}}};               /* there, too */
 static const unsigned MOTION[] = {{{motion}}};
 static const unsigned ACTION[] = {{{action}}};
 static const unsigned WATCHED[] = {{{watched}}};
@@ -142,7 +143,12 @@ def variables_header(build: str) -> str:
         "STEP_UNSTABLE": STEP_UNSTABLE,
         "STEP_TURNS": STEP_TURNS,
     }
-    counts = {"INPUT_COUNT": len(INPUTS), "STATE_COUNT": len(STATES), "CRAFT_COUNT": len(CRAFT_PARAMETERS)}
+    counts = {
+        "INPUT_COUNT": len(INPUTS),
+        "STATE_COUNT": len(STATES),
+        "MOTION_COUNT": len(MOTION),
+        "CRAFT_COUNT": len(CRAFT_PARAMETERS),
+    }
     return HEADER.format(
         build=build,
         guid=guid(build),
@@ -174,7 +180,8 @@ def variables_header(build: str) -> str:
         states=_constants(STATES),
         derivatives=_constants(DERIVATIVES),
         nominals=", ".join(_number(BY_NAME[name].nominal or 1.0) for name in STATES),
-        knowns=_constants(STATES + INPUTS),
+        knowns=_constants((*STATES, *INPUTS, *(name for name in CRAFT_PARAMETERS if BY_NAME[name].kind == "Real"))),
+        rows=_constants((*MOTION, *DERIVATIVES[3:], "projected_area")),
         motion=_constants(MOTION),
         action=_constants(ACTION),
         watched=_constants(WATCHED),

@@ -214,13 +214,13 @@ static inline void steer_at(struct load_function *f, double time)
     }
 }
 
-double kernel_friction_radius(const struct craft *craft)
+struct friction_radius kernel_friction_radius(const struct craft *craft)
 {
     const double length = craft->length, width = craft->width;
     const double d = sqrt(length * length + width * width);
     const double along = length * length / width * natural_logarithm((width + d) / length);
     const double across = width * width / length * natural_logarithm((length + d) / width);
-    return d / 6.0 + (along + across) / 12.0;
+    return (struct friction_radius){d / 6.0 + (along + across) / 12.0, d, along, across};
 }
 
 /* The loads on the craft, but for the friction of its skirt. */
@@ -244,7 +244,7 @@ static struct load_function sliding_load_function(const struct drive *drive, con
     struct load_function f = load_function(drive, craft);
     f.slides = true;
     f.force = friction_force(craft);
-    f.radius = kernel_friction_radius(craft);
+    f.radius = kernel_friction_radius(craft).radius;
     return f;
 }
 
@@ -322,7 +322,7 @@ static struct friction friction_function(const struct craft *craft, double h)
 {
     struct friction friction = {.rubs = rubs(craft)};
     if (friction.rubs) {
-        const double radius = kernel_friction_radius(craft), force = friction_force(craft);
+        const double radius = kernel_friction_radius(craft).radius, force = friction_force(craft);
         friction.radius = radius;
         friction.a = h * (force / craft->mass);
         friction.b = h * (force * radius * radius / craft->inertia);

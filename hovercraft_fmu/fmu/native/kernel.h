@@ -90,9 +90,13 @@ static inline double larger(double a, double b)
     return b > a ? b : a;
 }
 
+/* m: the mean distance of the points of the skirt's rectangle from its centre, diagonal/6 + (along + across)/12. */
+struct friction_radius {
+    double radius, diagonal, along, across;
+};
+
 struct derived kernel_derived(const struct craft *craft);
-/* m: the mean distance of the points of the skirt's rectangle from its centre. */
-double kernel_friction_radius(const struct craft *craft);
+struct friction_radius kernel_friction_radius(const struct craft *craft);
 
 struct controls kernel_saturate(const struct controls *controls, const struct craft *craft);
 struct controls kernel_controls_at(const struct drive *drive, double time);

@@ -11,17 +11,24 @@ static unsigned place_in(const unsigned *list, unsigned n, unsigned reference)
     return i;
 }
 
-static bool is_known(unsigned reference)
+/* The standard's knowns: in initialization mode the inputs, and every Real that is given exactly: states, parameters;
+   later the inputs and the states. */
+static bool is_known(enum phase phase, unsigned reference)
 {
+    if (phase == INITIALIZING)
+        return reference < VARIABLE_COUNT && VARIABLES[reference].kind == REAL && VARIABLES[reference].start_given;
     return place_in(KNOWNS, KNOWN_COUNT, reference) < KNOWN_COUNT;
 }
 
-/* States and their derivatives, and what else is an output. */
-static bool is_unknown(unsigned reference)
+/* And its unknowns: in initialization mode those that are calculated then; later states and their derivatives, and what
+   else is an output. */
+static bool is_unknown(enum phase phase, unsigned reference)
 {
+    if (phase == INITIALIZING)
+        return place_in(ROWS, ROW_COUNT, reference) < ROW_COUNT;
     return place_in(STATES, STATE_COUNT, reference) < STATE_COUNT ||
            place_in(DERIVATIVES, STATE_COUNT, reference) < STATE_COUNT ||
-           place_in(MOTION, ROW_COUNT, reference) < ROW_COUNT;
+           place_in(MOTION, MOTION_COUNT, reference) < MOTION_COUNT;
 }
 
 static enum verdict refuse(struct instance *instance, const char *call, unsigned reference, const char *what,
@@ -36,13 +43,30 @@ static enum verdict refuse(struct instance *instance, const char *call, unsigned
 static enum verdict check_references(struct instance *instance, const char *call, const unsigned *unknowns,
                                      size_t n_unknowns, const unsigned *knowns, size_t n_knowns)
 {
+    const enum phase phase = instance->now.phase;
+    const bool initial = phase == INITIALIZING;
     for (size_t i = 0; i < n_unknowns; i++)
-        if (!is_unknown(unknowns[i]))
-            return refuse(instance, call, unknowns[i], "unknown", "must be an output or the derivative of a state");
+        if (!is_unknown(phase, unknowns[i]))
+            return refuse(instance, call, unknowns[i], "unknown",
+                          initial ? "must be calculated in initialization mode: one of the InitialUnknowns"
+                                  : "must be an output or the derivative of a state after initialization mode");
     for (size_t k = 0; k < n_knowns; k++)
-        if (!is_known(knowns[k]))
-            return refuse(instance, call, knowns[k], "known", "must be a state or an input");
+        if (!is_known(phase, knowns[k]))
+            return refuse(instance, call, knowns[k], "known",
+                          initial ? "must be a state, an input or a Real parameter in initialization mode"
+                                  : "must be a state or an input after initialization mode");
     return FINE;
+}
+
+/* Whether one of them is the derivative of a velocity. */
+static bool is_accelerated(const unsigned *unknowns, size_t n_unknowns)
+{
+    for (size_t i = 0; i < n_unknowns; i++) {
+        const unsigned row = place_in(ROWS, ROW_COUNT, unknowns[i]);
+        if (row >= ACCELERATION_X && row <= ACCELERATION_YAW)
+            return true;
+    }
+    return false;
 }
 
 static bool is_held(const struct content *content)
@@ -53,14 +77,11 @@ static bool is_held(const struct content *content)
 
 double instance_partial(const struct linearization *linearization, unsigned unknown, unsigned known)
 {
-    const unsigned column = place_in(KNOWNS, KNOWN_COUNT, known);
-    const unsigned motion = place_in(MOTION, ROW_COUNT, unknown);
-    const unsigned acceleration = place_in(DERIVATIVES + STATE_COUNT - ROW_COUNT, ROW_COUNT, unknown);
-    if (motion < ROW_COUNT)
-        return linearization->motion[motion][column];
-    if (acceleration < ROW_COUNT)
-        return linearization->acceleration[acceleration][column];
-    return unknown == known ? 1.0 : 0.0; /* a state; the velocities are derivatives, too */
+    const unsigned row = place_in(ROWS, ROW_COUNT, unknown);
+    const unsigned column = place_in(KNOWNS, INITIAL_KNOWN_COUNT, known);
+    if (row < ROW_COUNT && column < INITIAL_KNOWN_COUNT)
+        return linearization->of[row][column];
+    return unknown == known ? 1.0 : 0.0; /* a state; the velocities are derivatives, too; a parameter that acts on none */
 }
 
 enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns,
@@ -73,10 +94,10 @@ enum verdict instance_linearize(struct instance *instance, const char *call, con
     if (check_references(instance, call, unknowns, n_unknowns, knowns, n_knowns) == REFUSED ||
         instance_get_reals(instance, NULL, 0, NULL) == REFUSED) /* all is up to date after that */
         return REFUSED;
-    if (is_held(now))
+    if (is_held(now) && is_accelerated(unknowns, n_unknowns))
         return instance_say(instance, REFUSED, "%s: the craft is at rest on ground that rubs: it must slide to have "
                                                "partial derivatives", call);
-    kernel_linearize(&now->state, &now->controls, &now->craft, linearization);
+    kernel_linearize(&now->state, &now->controls, &now->craft, now->phase == INITIALIZING, linearization);
     for (size_t i = 0; i < n_unknowns; i++)
         for (size_t k = 0; k < n_knowns; k++) {
             const double value = instance_partial(linearization, unknowns[i], knowns[k]);
