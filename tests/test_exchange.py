@@ -24,7 +24,6 @@ from hovercraft_fmu.fmu.interface import (
     INPUTS,
     MOTION,
     STATES,
-    VARIABLES,
     WATCHED,
     observe_action,
     observe_motion,
@@ -633,10 +632,10 @@ def test_only_initialization_mode_has_parameters_as_knowns(instance: Any, messag
     expected = jacobian(instance, INITIAL_UNKNOWNS, INITIAL_KNOWNS) @ np.array(seeds)
     assert found == pytest.approx(expected, rel=1e-13, abs=1e-13)
     for unknown, known, said in (
-        ("pose.x", "mass", "unknown pose.x: must be calculated in initialization mode: one of the InitialUnknowns"),
-        ("force.x", "mass", "unknown force.x: must be calculated in"),
-        ("mass", "mass", "unknown mass: must be calculated in"),
-        ("speed", "speed", "known speed: must be a state, an input or a Real parameter in initialization mode"),
+        ("pose.x", "mass", "unknown pose.x: must be one of the initial unknowns in initialization mode"),
+        ("force.x", "mass", "unknown force.x: must be one of the initial"),
+        ("mass", "mass", "unknown mass: must be one of the initial"),
+        ("speed", "speed", "known speed: must be a state, an input or a real parameter in initialization mode"),
         ("speed", "drag_area", "known drag_area: must be a state, an input or"),
         ("speed", "projected_area", "known projected_area: must be a state, an input or"),
     ):
@@ -702,6 +701,39 @@ def test_the_side_that_is_taken_at_a_kink(instance: Any) -> None:
     assert partial(instance, "acceleration.x", "thrust") == 0.0
 
 
+def test_the_side_that_is_taken_at_a_kink_of_a_parameter(instance: Any) -> None:
+    """A limit that the thrust is at does not act; friction begins from none, at rest against the push."""
+    _to(instance, "initialization mode")
+    for thrust, low, high in ((0.0, 0.0, 0.0), (10.0, 0.0, 0.0), (-1e-9, 0.01, 0.0), (10.1, 0.0, 0.01)):
+        put(instance, thrust=thrust)
+        slopes = [partial(instance, "acceleration.x", f"thrust_{limit}") for limit in ("min", "max")]
+        assert slopes == [low, high]
+    put(instance, thrust=5.0, thrust_min=5.0, thrust_max=5.0)  # nothing is inside
+    assert [partial(instance, "acceleration.x", f"thrust_{limit}") for limit in ("min", "max")] == [0.0, 0.0]
+    assert partial(instance, "acceleration.x", "skirt_friction") == pytest.approx(-Craft().gravity, rel=1e-14)
+    put(instance, velocity__x=-0.1)
+    assert partial(instance, "acceleration.x", "skirt_friction") == pytest.approx(Craft().gravity, rel=1e-14)
+    put(instance, velocity__x=0.0, thrust_min=0.0, thrust=0.0)  # nothing pushes, nothing rubs
+    assert partial(instance, "acceleration.x", "skirt_friction") == 0.0
+
+
+def test_friction_that_begins_at_rest(stepped: Any) -> None:
+    """Its slope is that of what is read with a very little of it: linear in it, to a relative error of its size."""
+    held = {"thrust": 5.0, "port_thruster": 0.7, "wind__x": 0.4, "wind__y": -0.2, "pose__heading": 0.3}
+    little = 1e-7
+    rows = INITIAL_UNKNOWNS[3:6]
+    read = []
+    for friction in (0.0, little):
+        stepped.reset()
+        put(stepped, **held, skirt_friction=friction)
+        stepped.setupExperiment()
+        stepped.enterInitializationMode()
+        read.append(np.array(get(stepped, *rows)))
+    put(stepped, skirt_friction=0.0)
+    slopes = jacobian(stepped, rows, ("skirt_friction",))[:, 0]
+    assert slopes == pytest.approx((read[1] - read[0]) / little, rel=1e-4)
+
+
 def test_a_craft_that_friction_holds_has_no_partial_derivatives(each_native_fmu: Path) -> None:
     with one(each_native_fmu) as (stepping, said):
         start(stepping, skirt_friction=0.1)
@@ -712,6 +744,7 @@ def test_a_craft_that_friction_holds_has_no_partial_derivatives(each_native_fmu:
             "derivatives"
         )
         assert said == [worded(stepping, message)]
+        assert partial(stepping, "speed", "velocity.x") == 0.0  # what friction does not act on has them
 
 
 # ---- the description
@@ -752,11 +785,40 @@ def test_dependencies_are_where_partial_derivatives_are_not_zero(use: str, descr
         assert listed == {name for name, each in zip(KNOWNS, acts[row], strict=True) if each}, unknown.variable.name
 
 
-def test_a_parameter_that_is_listed_acts_on_the_initial_acceleration(description: Any) -> None:
+def initially_read(instance: Any, values: dict[str, float], drag_area: int) -> list[float]:
+    instance.reset()
+    instance.setInteger([reference("drag_area")], [drag_area])
+    instance.setReal([reference(name) for name in values], list(values.values()))
+    return get(instance, *INITIAL_UNKNOWNS)
+
+
+def test_initial_dependencies_are_where_partial_derivatives_are_not_zero(description: Any, stepped: Any) -> None:
+    """Over random craft that slide; and, which has no derivatives, where one at rest begins to."""
+    dice = np.random.default_rng(2)
+    acts = {(unknown, known): False for unknown in INITIAL_UNKNOWNS for known in (*INITIAL_KNOWNS, "drag_area")}
+    for i in range(20):
+        varied = {name: getattr(Craft(), name) * dice.uniform(0.5, 1.0) for name in PARAMETERS}
+        varied |= {"skirt_friction": 1e-4, "rotational_drag": dice.uniform(0.1, 0.8), "thrust_min": 1.0}
+        craft = Craft(**varied, drag_area=1 + i % 2)
+        state, held = State(*dice.normal(size=6)), Controls((0.0, 3.0, 20.0)[i % 3], 0.5, 0.3, *dice.normal(size=2))
+        initialize(stepped, state, held, craft)
+        matrix = jacobian(stepped, INITIAL_UNKNOWNS, INITIAL_KNOWNS)
+        for row, unknown in zip(matrix, INITIAL_UNKNOWNS, strict=True):
+            for value, known in zip(row, INITIAL_KNOWNS, strict=True):
+                acts[unknown, known] |= bool(value != 0.0)
+        resting = state._replace(vx=0.0, vy=0.0, yaw_rate=0.0)
+        values = dict(zip(KNOWNS, (*resting, *held), strict=True)) | varied
+        before = initially_read(stepped, values, 1)
+        for known in (*INITIAL_KNOWNS, "drag_area"):
+            moved = values | ({} if known == "drag_area" else {known: values[known] * 1.1 + 0.01})
+            after = initially_read(stepped, moved, 2 if known == "drag_area" else 1)
+            for unknown, old, new in zip(INITIAL_UNKNOWNS, before, after, strict=True):
+                acts[unknown, known] |= bool(old != new)
     listed = {u.variable.name: {v.name for v in u.dependencies} for u in description.initialUnknowns}
-    for name in DERIVATIVES[3:]:
-        assert listed[name] >= {field.name for field in fields(Craft)}
-        assert listed[name] <= {v.name for v in VARIABLES if v.start is not None}
+    assert listed == {
+        unknown: {known for (each, known), does in acts.items() if does and each == unknown}
+        for unknown in INITIAL_UNKNOWNS
+    }
 
 
 def test_fmpy_takes_co_simulation_unless_asked(native_fmu: Path) -> None:

@@ -18,10 +18,10 @@ from lxml import etree
 from numpy.typing import NDArray
 
 from hovercraft_fmu.fmu.description import NATIVE3
-from hovercraft_fmu.fmu.interface import INPUTS, MOTION, STATES, TIME, VARIABLES
+from hovercraft_fmu.fmu.interface import DERIVATIVES, INPUTS, MOTION, STATES, TIME, VARIABLES
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, read_description, run_fmu
-from tests.lowlevel import everything, one, reference, start
+from tests.lowlevel import everything, one, put, reference, start
 from tests.test_native import METHODS, STEPS
 
 OK, WARNING, ERROR = 0, 1, 3
@@ -34,7 +34,10 @@ TERMS: dict[str, dict[str, float | str]] = {
     "no drag": {"drag_coefficient": 0.0},
 }
 KNOWNS = [reference(name) for name in (*STATES, *INPUTS)]
-UNKNOWNS = [reference(name) for name in (*STATES, *MOTION, "acceleration.x", "acceleration.y", "acceleration.yaw")]
+ACCELERATIONS = DERIVATIVES[3:]
+UNKNOWNS = [reference(name) for name in (*STATES, *MOTION, *ACCELERATIONS)]
+INITIAL_KNOWNS = [*KNOWNS, *(v.reference for v in VARIABLES if v.kind == "Real" and v.causality == "parameter")]
+INITIAL_UNKNOWNS = [reference(name) for name in (*MOTION, *ACCELERATIONS, "projected_area")]
 
 
 @pytest.fixture(scope="module")
@@ -191,20 +194,34 @@ def test_a_bad_list_is_refused_and_changes_nothing(name: str, instance: Any, mes
 # ---- partial derivatives
 
 
-def test_adjoint_derivatives_are_the_transposed_jacobian(instance: Any) -> None:
+def assert_transposed(instance: Any, unknowns: list[int], knowns: list[int], nonzero: int) -> None:
     """Bit by bit; the entries themselves are checked with the directional derivatives."""
-    start(instance, pose__heading=0.3, velocity__x=2.0, velocity__y=0.5, velocity__yaw_rate=0.1, wind__y=0.3)
-    units = np.eye(len(KNOWNS))
-    columns = [instance.getDirectionalDerivative(UNKNOWNS, KNOWNS, list(unit)) for unit in units]
+    columns = [instance.getDirectionalDerivative(unknowns, knowns, list(unit)) for unit in np.eye(len(knowns))]
     rows = [
-        instance.getAdjointDerivative(UNKNOWNS, KNOWNS, list(unit), nSensitivity=len(KNOWNS))
-        for unit in np.eye(len(UNKNOWNS))
+        instance.getAdjointDerivative(unknowns, knowns, list(unit), nSensitivity=len(knowns))
+        for unit in np.eye(len(unknowns))
     ]
     assert np.array_equal(np.array(columns).T, np.array(rows))
-    assert np.count_nonzero(rows) == 6 + 8 + 26  # states; surge, sway, speed; accelerations
-    seeds = np.linspace(-1.0, 1.0, len(UNKNOWNS))
-    found = instance.getAdjointDerivative(UNKNOWNS, KNOWNS, list(seeds), nSensitivity=len(KNOWNS))
+    assert np.count_nonzero(rows) == nonzero
+    seeds = np.linspace(-1.0, 1.0, len(unknowns))
+    found = instance.getAdjointDerivative(unknowns, knowns, list(seeds), nSensitivity=len(knowns))
     assert found == pytest.approx(list(seeds @ np.array(rows)), rel=1e-12, abs=1e-15)
+
+
+MOVING = {"pose__heading": 0.3, "velocity__x": 2.0, "velocity__y": 0.5, "velocity__yaw_rate": 0.1, "wind__y": 0.3}
+
+
+def test_adjoint_derivatives_are_the_transposed_jacobian(instance: Any) -> None:
+    start(instance, **MOVING)
+    assert_transposed(instance, UNKNOWNS, KNOWNS, 6 + 8 + 26)  # states; surge, sway, speed; accelerations
+
+
+def test_adjoint_derivatives_in_initialization_mode(instance: Any) -> None:
+    """Of parameters, too: 3 act on the area; 9 on each acceleration, and rotational drag on that of yaw."""
+    put(instance, **MOVING, port_thruster=0.5)
+    instance.setupExperiment()
+    instance.enterInitializationMode()
+    assert_transposed(instance, INITIAL_UNKNOWNS, INITIAL_KNOWNS, 8 + 26 + 3 + 3 * 9 + 1)
 
 
 # ---- every function

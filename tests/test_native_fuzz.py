@@ -33,8 +33,13 @@ SPOILED = {
         "    if (now->phase == CONTINUOUS_TIME && n > 0 && isfinite(values[0]))\n"
         "        now->state.x = values[0], now->moved = true;\n",
     ),
+    "partials.c": (
+        "    kernel_linearize(&now->state, &now->controls, &now->craft, now->phase == INITIALIZING, linearization);\n",
+        "    if (now->phase == INITIALIZING && n_knowns > 0 && knowns[0] >= V_MASS && knowns[0] <= V_THRUST_MAX)\n"
+        "        instance->now.time += 1.0;\n",
+    ),
 }
-"""File: a line before inputs, or states, are all checked, and one that sets some already there."""
+"""File: a line before inputs, states, or derivatives over a parameter are all checked, and one that sets some there."""
 
 
 @pytest.mark.parametrize("file", SPOILED)

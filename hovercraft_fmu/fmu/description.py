@@ -275,8 +275,8 @@ def _followed(acceleration: str) -> tuple[str, ...]:
 
 
 def _followed_initially(acceleration: str) -> tuple[str, ...]:
-    """And of the parameters, too. At rest on ground that rubs each acceleration follows the whole push: the thrust, too,
-    and mass and inertia both; to rotate in air has a moment alone.
+    """And the parameters. At rest on ground that rubs each acceleration follows the whole push: a moment, too, the
+    thrust, mass and inertia. Rotational drag is a moment, and nothing at rest.
     """
     parameters = tuple(
         name for name in CRAFT_PARAMETERS if not (name == "rotational_drag" and acceleration != "acceleration.yaw")

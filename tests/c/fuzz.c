@@ -102,18 +102,33 @@ static double real_of(void *craft, unsigned reference)
     return call_get(craft, &reference, 1, &value) == CALL_OK ? value : NAN;
 }
 
+/* Of partial derivatives: mostly all of initialization mode, or all of the later ones. */
+static void some_references(struct bytes *bytes, unsigned unknowns[MOST], unsigned knowns[MOST])
+{
+    const unsigned initial = a_byte(bytes) & 1, count = initial ? INITIAL_KNOWN_COUNT : KNOWN_COUNT;
+    for (size_t i = 0; i < MOST; i++) {
+        const unsigned row = a_byte(bytes), column = a_byte(bytes);
+        unknowns[i] = row >= 224 ? a_reference(bytes) : initial ? ROWS[row % ROW_COUNT] : V_POSE_X + row % 16;
+        knowns[i] = column >= 224 ? a_reference(bytes) : KNOWNS[column % count];
+    }
+}
+
 #if FMI == 3
 #include "fuzz_fmi3.h"
 #else
 #include "fuzz_fmi2.h"
 #endif
 
-/* Half of them are past their start already; in continuous-time mode, where they are for that. */
+/* Half of them are past their start already; in continuous-time mode, where they are for that. Of the others half are
+   in initialization mode. */
 static void *started(struct bytes *bytes)
 {
     void *craft = made(bytes);
-    if (craft && a_byte(bytes) & 1) {
-        demand(enter(craft) == CALL_OK && call_go(craft) == CALL_OK, "initialization");
+    const unsigned how = craft ? a_byte(bytes) : 0;
+    if (how & 3)
+        demand(enter(craft) == CALL_OK, "to initialization mode");
+    if (how & 1) {
+        demand(call_go(craft) == CALL_OK, "initialization");
         call_go_continuous(craft);
     }
     return craft;

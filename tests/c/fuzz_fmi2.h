@@ -89,11 +89,9 @@ static int partial_derivatives(void *craft, struct bytes *bytes, const struct wo
     const size_t n = how % MOST, m = how / MOST % MOST;
     unsigned unknowns[MOST], knowns[MOST];
     double seeds[MOST], values[MOST];
-    for (size_t i = 0; i < MOST; i++) {
-        unknowns[i] = a_byte(bytes) & 7 ? V_POSE_X + a_byte(bytes) % 16 : a_reference(bytes);
-        knowns[i] = a_byte(bytes) & 7 ? a_byte(bytes) % V_BODY_SURGE : a_reference(bytes);
+    some_references(bytes, unknowns, knowns);
+    for (size_t i = 0; i < MOST; i++)
         seeds[i] = a_double(bytes);
-    }
     const fmi2Status status = fmi2GetDirectionalDerivative(craft, unknowns, n, how == 255 ? NULL : knowns, m, seeds,
                                                            how == 254 ? NULL : values);
     for (size_t i = 0; i < n && status == fmi2OK; i++)

@@ -99,11 +99,9 @@ static int partial_derivatives(void *craft, struct bytes *bytes, const struct wo
     const size_t n = how % MOST, m = how / MOST % MOST, rows = backward ? m : n, more = how > 250;
     unsigned unknowns[MOST], knowns[MOST];
     double seeds[MOST + 1], values[MOST + 1];
-    for (size_t i = 0; i < MOST; i++) {
-        unknowns[i] = a_byte(bytes) & 7 ? V_POSE_X + a_byte(bytes) % 16 : a_reference(bytes);
-        knowns[i] = a_byte(bytes) & 7 ? a_byte(bytes) % V_BODY_SURGE : a_reference(bytes);
+    some_references(bytes, unknowns, knowns);
+    for (size_t i = 0; i < MOST; i++)
         seeds[i] = a_double(bytes);
-    }
     const unsigned *k = how == 250 ? NULL : knowns;
     double *v = how == 249 ? NULL : values;
     const int status = backward ? fmi3GetAdjointDerivative(craft, unknowns, n, k, m, seeds, n + more, v, m)

@@ -91,9 +91,11 @@ enum verdict instance_get_states(struct instance *instance, const char *call, do
 enum verdict instance_get_derivatives(struct instance *instance, const char *call, double *values, size_t n);
 enum verdict instance_get_nominals(struct instance *instance, const char *call, double *values, size_t n);
 
-/* The partial derivatives of outputs and of the states' derivatives with respect to states and inputs, for either use,
-   from initialization mode on, where what is read stands: in co-simulation with the controls of the last step. Refused:
-   an unknown or a known that is none of these, what is no finite number, a craft that friction holds. */
+/* The partial derivatives, for either use, from initialization mode on, where what is read stands: in co-simulation
+   with the controls of the last step. In initialization mode of what is calculated then (ROWS), with respect to inputs,
+   states and real parameters; later of outputs and of the states' derivatives, with respect to states and inputs.
+   Refused: an unknown or a known that is none of these, what is no finite number, accelerations of a craft at rest on
+   ground that rubs. */
 enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns,
                                 size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
                                 struct linearization *linearization);

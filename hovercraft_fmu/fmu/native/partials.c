@@ -48,12 +48,12 @@ static enum verdict check_references(struct instance *instance, const char *call
     for (size_t i = 0; i < n_unknowns; i++)
         if (!is_unknown(phase, unknowns[i]))
             return refuse(instance, call, unknowns[i], "unknown",
-                          initial ? "must be calculated in initialization mode: one of the InitialUnknowns"
+                          initial ? "must be one of the initial unknowns in initialization mode"
                                   : "must be an output or the derivative of a state after initialization mode");
     for (size_t k = 0; k < n_knowns; k++)
         if (!is_known(phase, knowns[k]))
             return refuse(instance, call, knowns[k], "known",
-                          initial ? "must be a state, an input or a Real parameter in initialization mode"
+                          initial ? "must be a state, an input or a real parameter in initialization mode"
                                   : "must be a state or an input after initialization mode");
     return FINE;
 }
@@ -81,7 +81,7 @@ double instance_partial(const struct linearization *linearization, unsigned unkn
     const unsigned column = place_in(KNOWNS, INITIAL_KNOWN_COUNT, known);
     if (row < ROW_COUNT && column < INITIAL_KNOWN_COUNT)
         return linearization->of[row][column];
-    return unknown == known ? 1.0 : 0.0; /* a state; the velocities are derivatives, too; a parameter that acts on none */
+    return unknown == known ? 1.0 : 0.0; /* of states, or velocities; nothing else follows a parameter of the steps */
 }
 
 enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns,
