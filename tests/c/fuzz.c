@@ -292,7 +292,7 @@ static int called(struct bytes *bytes, struct world *world, void **craft)
     case 10:
         return statuses(*craft, bytes);
     case 11:
-        return a_byte(bytes) & 1 ? cancel(*craft) : partial_derivatives(*craft, bytes, world);
+        return a_byte(bytes) < 32 ? cancel(*craft) : partial_derivatives(*craft, bytes, world);
     case 12:
     case 13:
         return integers(*craft, bytes);
