@@ -61,4 +61,4 @@ def test_it_would_find_a_refused_call_that_changes_something(
 
     monkeypatch.setattr(fuzz, "written_sources", spoiled)
     with pytest.raises(AssertionError, match="a refused call changed something"):
-        fuzz.fuzz(tmp_path, 60)
+        fuzz.fuzz(tmp_path, 240)  # it ends when it has found it; the draws are the same on every machine
