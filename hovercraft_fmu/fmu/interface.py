@@ -289,8 +289,6 @@ TIME = Variable(1000, "time", "independent", "continuous", "s", None, "Simulatio
 """FMI 3.0 wants it among the variables. Its value reference is none of the table's, which grow by one."""
 
 BY_NAME: Mapping[str, Variable] = MappingProxyType({variable.name: variable for variable in VARIABLES})
-INDEX: Mapping[str, int] = MappingProxyType({variable.name: i for i, variable in enumerate(VARIABLES, 1)})
-"""Place in ModelVariables, counted from 1: what the model structure refers to."""
 
 INPUTS = ("thrust", "port_thruster", "starboard_thruster", "wind.x", "wind.y")
 """In the order of Controls."""
