@@ -166,6 +166,10 @@ def simulate_command(
     start_values = _settings(settings)
     inputs: Inputs = log if log else scene or "launch"
     others = [{**start_values, **_settings(against.split(","), "--against")}] if against is not None else []
+    if plot:
+        from .view.plots import check_plot
+
+        check_plot(plot)
     if animation:
         from .view.animation import check_animation
 
@@ -285,7 +289,9 @@ def benchmark() -> None:
 
 @commands.command()
 @click.option("--quick", is_flag=True, help="One scene, one repeat: half a minute instead of minutes.")
-@click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "trade", show_default=True)
+@click.option(
+    "--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("build") / "trade", show_default=True
+)
 def trade(quick: bool, output: Path) -> None:
     """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes.
 
@@ -301,7 +307,9 @@ def trade(quick: bool, output: Path) -> None:
 
 
 @commands.command()
-@click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "stability", show_default=True)
+@click.option(
+    "--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("build") / "stability", show_default=True
+)
 def stability(output: Path) -> None:
     """Measure where each method breaks: limits of the step, and a random study of the extremes."""
     from .trade import stability as study
@@ -310,7 +318,9 @@ def stability(output: Path) -> None:
 
 
 @commands.command("scene-terms")
-@click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "scene_terms", show_default=True)
+@click.option(
+    "--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("build") / "scene_terms", show_default=True
+)
 def scene_terms(output: Path) -> None:
     """Measure what each opt-in term costs, and what leaving it out costs in accuracy, over the scenes."""
     from .trade import scene_terms as study
@@ -346,6 +356,10 @@ def sweep_command(
     if study is None:
         raise click.UsageError("STUDY: must be given")
     chosen = read_study(study)
+    if plot:
+        from .view.plots import check_plot
+
+        check_plot(plot)
     begun = perf_counter()
     with _progress(chosen.runs, "sweeping", MofNCompleteColumn(), _Rate()) as tell:
         outcome = sweep(chosen, fmu, output=output, tell=tell, **options)
@@ -364,7 +378,9 @@ def sweep_command(
 
 
 @commands.command()
-@click.option("--output", type=click.Path(path_type=Path), default=Path("build") / "coupling", show_default=True)
+@click.option(
+    "--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("build") / "coupling", show_default=True
+)
 def coupling(output: Path) -> None:
     """Measure what the communication step of the closed loop costs, for two ways to couple, beside the integrator."""
     from .trade import coupling as study

@@ -206,3 +206,4 @@ def test_what_is_not_installed_is_named(fmu: Path, tmp_path: Path, missing: str,
     assert done.returncode == 1
     assert f"pip install 'hovercraft-fmu[{extra}]'" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+    assert not done.stdout  # before the run

@@ -115,6 +115,8 @@ def test_list_scenes(shell: Shell) -> None:
         (("simulate", "--input", "nix.csv"), "nix.csv: No such file or directory"),
         (("simulate", "--input", "nix.csv", "--scene", "turn"), "must not be given together"),
         (("simulate", "nix.fmu"), "nix.fmu: no such FMU"),
+        (("simulate", "--plot", "a.txt"), "plot = 'a.txt': must end in .png"),
+        (("sweep", "turning_circle", "--plot", "a.txt"), "plot = 'a.txt': must end in .png"),
         (("simulate", "--preset", "moon"), "preset = 'moon': must be one of textbook, ice"),
         (("simulate", "--stop-time", "soon"), "'soon' is not a valid float"),
         (("simulate", "--frob",), "No such option"),
@@ -136,6 +138,7 @@ def test_without_matplotlib_a_picture_says_how_to_get_it(shell: Shell) -> None:
     assert done.returncode == 1
     assert "pip install 'hovercraft-fmu[plot]'" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+    assert not done.stdout  # before the run
 
 
 def test_benchmark_prints_its_ratios(shell: Shell) -> None:

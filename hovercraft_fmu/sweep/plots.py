@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from ..view.plots import SEA, new_figure
+from ..view.plots import SEA, check_plot, new_figure
 from .quantities import display
 from .store import KEY, TRAJECTORIES, load
 from .study import GRID
@@ -36,10 +36,11 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
     points over each.
 
     Raises:
-        ModuleNotFoundError: matplotlib is not installed; says how to install it.
-        ValueError: see `load`; OSError: the file cannot be written.
+        ValueError: see `load` and `check_plot`.
+        ModuleNotFoundError: see `check_plot`.
+        OSError: the file cannot be written.
     """
-    path = Path(path)
+    path = check_plot(path)
     runs = load(folder)
     about = json.loads(runs.schema.metadata[KEY])
     study = json.loads(about["study"])

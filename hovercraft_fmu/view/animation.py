@@ -83,10 +83,16 @@ class Track(NamedTuple):
 
 
 def check_animation(path: str | os.PathLike[str]) -> Path:
-    """The path. Raises ValueError: the name is none of an animation."""
+    """The path; so that a run need not be made to learn that it cannot be drawn.
+
+    Raises:
+        ValueError: the name ends in neither .gif nor .html.
+        ModuleNotFoundError: matplotlib (for a GIF) or plotly (for a page) is not installed; says how to install it.
+    """
     path = Path(path)
     if path.suffix not in SUFFIXES:
         raise ValueError(f"animation = {str(path)!r}: must end in .gif (a moving picture) or .html (a page)")
+    (new_figure if path.suffix == ".gif" else _plotly)()
     return path
 
 
@@ -94,8 +100,8 @@ def animate(results: Sequence[Result], path: str | os.PathLike[str], tell: Tell 
     """Write one run, or two over the same communication points, as a GIF or as a page that needs no network.
 
     Raises:
-        ValueError: the name ends in neither .gif nor .html; more than two runs, or runs over different times.
-        ModuleNotFoundError: matplotlib (for a GIF) or plotly (for a page) is not installed; says how to install it.
+        ValueError: see `check_animation`; more than two runs, or runs over different times.
+        ModuleNotFoundError: see `check_animation`.
         OSError: the file cannot be written.
     """
     path = check_animation(path)
@@ -316,14 +322,19 @@ def _draw_apart(axes: "Axes", tracks: Sequence[Track]) -> "Line2D":
 # ---- as a page
 
 
-def _write_page(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
-    """Every figure's data and plotly's script are in the page."""
+def _plotly() -> tuple[Any, Any]:
+    """plotly's modules graph_objects and subplots. Raises ModuleNotFoundError, which says how to install it."""
     try:
-        graphs, subplots = (importlib.import_module(f"plotly.{name}") for name in ("graph_objects", "subplots"))
+        return importlib.import_module("plotly.graph_objects"), importlib.import_module("plotly.subplots")
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
             "pages need plotly, which is not installed: pip install 'hovercraft-fmu[html]'"
         ) from error
+
+
+def _write_page(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
+    """Every figure's data and plotly's script are in the page."""
+    graphs, subplots = _plotly()
     two = len(tracks) == 2
     figure = subplots.make_subplots(cols=2 if two else 1, column_widths=[0.68, 0.32] if two else None)
     for i, track in enumerate(tracks):

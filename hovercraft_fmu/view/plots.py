@@ -28,10 +28,10 @@ def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
     """Draw the path with the craft along it, the controls, the speeds and the heading over time, as a PNG.
 
     Raises:
-        ModuleNotFoundError: matplotlib is not installed; says how to install it.
+        ValueError, ModuleNotFoundError: see `check_plot`.
         OSError: the file cannot be written.
     """
-    path = Path(path)
+    path = check_plot(path)
     figure = new_figure(figsize=(12.0, 6.75), dpi=120, layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
     figure.suptitle(f"{result.run.title}: {result.distance:.0f} m in {result['time'][-1] - result['time'][0]:g} s")
@@ -45,6 +45,20 @@ def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
     _draw_heading(heading, result)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, format="png", metadata={"Software": None})
+    return path
+
+
+def check_plot(path: str | os.PathLike[str]) -> Path:
+    """The path; so that a run need not be made to learn that it cannot be drawn.
+
+    Raises:
+        ValueError: the name does not end in .png.
+        ModuleNotFoundError: matplotlib is not installed; says how to install it.
+    """
+    path = Path(path)
+    if path.suffix != ".png":
+        raise ValueError(f"plot = {str(path)!r}: must end in .png")
+    new_figure()
     return path
 
 
@@ -65,7 +79,7 @@ def plot_passage(passage: Passage, path: str | os.PathLike[str]) -> Path:
 
     Raises as `plot_run` does.
     """
-    path = Path(path)
+    path = check_plot(path)
     figure = new_figure(figsize=(12.0, 6.75), dpi=120, layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
     voyage, time = passage.voyage, passage["time"]
