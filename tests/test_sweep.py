@@ -26,6 +26,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from hovercraft_fmu import simulate
+from hovercraft_fmu.autopilot.package import build_autopilot
 from hovercraft_fmu.cli import main
 from hovercraft_fmu.fmu.interface import STEP_UNSTABLE
 from hovercraft_fmu.model.dynamics import Controls
@@ -587,6 +588,11 @@ def test_a_scheduler_that_is_not_there(fmu: Path, tmp_path: Path, monkeypatch: p
 def test_an_fmu_of_fmi_3_is_refused(tmp_path: Path, native3_fmu: Path) -> None:
     with pytest.raises(ValueError, match=r"HovercraftNative3\.fmu: must be an FMU for co-simulation, FMI 2\.0"):
         sweep(MASSES, native3_fmu, workers=1, output=tmp_path)
+
+
+def test_an_fmu_of_another_model_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"Autopilot\.fmu: is an FMU of the model 'Autopilot': must be of"):
+        sweep(MASSES, build_autopilot(tmp_path / "Autopilot.fmu"), workers=1, output=tmp_path)
 
 
 def test_bad_arguments(tmp_path: Path, fmu: Path) -> None:

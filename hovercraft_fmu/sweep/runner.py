@@ -21,8 +21,10 @@ import numpy as np
 import pyarrow as pa
 import scipy
 from dask.system import CPU_COUNT
+from distributed.comm.addressing import get_address_host_port
 
 from .._version import __version__
+from ..fmu.description import MODEL_NAME
 from ..model.integrators import INTEGRATORS
 from ..simulation import SimulationError, default_fmu, read_description
 from .engines import SETTINGS, Driver, Plan, run_batch
@@ -210,7 +212,7 @@ def _content(study: Study, path: Path) -> bytes:
     """The FMU as it is now, checked."""
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes it")
-    has = {variable.name for variable in read_description(path, versions=("2.0",)).modelVariables}
+    has = {variable.name for variable in read_description(path, model=MODEL_NAME, versions=("2.0",)).modelVariables}
     for name in (*study.run.start_values, *(factor.name for factor in study.factors), *study.keep.read, *SETTINGS):
         if name not in has:
             raise ValueError(f"{path}: must have the variable {name}")
@@ -284,9 +286,10 @@ def _workers(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 
 def _connected(scheduler: str) -> Any:
     try:
-        return distributed.Client(scheduler, set_as_default=False, timeout=CONNECT)
+        get_address_host_port(scheduler)  # a client that was made with a bad one lingers, and then complains
     except ValueError as error:
         raise ValueError(f"scheduler = {scheduler!r}: must be an address as tcp://10.0.0.1:8786; {error}") from error
+    return distributed.Client(scheduler, set_as_default=False, timeout=CONNECT)
 
 
 def _local_cluster(workers: int, folder: str) -> Any:
