@@ -41,3 +41,11 @@ def test_its_code_runs(number: int, fmu: Path, native_fmu: Path, autopilot: Path
         shutil.copy(path, tmp_path / "build" / path.name)
     build_ssp(tmp_path / "build" / "HovercraftLoop.ssp", fmu, autopilot)
     assert re.search(PRINTED[number], fresh(code))
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("number", [0, 1])
+def test_its_first_sections_run_with_fmi_3(number: int, native3_fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
+    (tmp_path / "build").mkdir()
+    shutil.copy(native3_fmu, tmp_path / "build" / native3_fmu.name)
+    assert re.search(PRINTED[number], fresh(BLOCKS[number].replace("Hovercraft.fmu", native3_fmu.name)))
