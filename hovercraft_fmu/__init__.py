@@ -1,4 +1,4 @@
-"""A hovercraft as a co-simulation FMU: build it, run it."""
+"""A hovercraft as an FMU: build it, run it."""
 
 from ._version import __version__
 from .fmu.package import build_fmu
