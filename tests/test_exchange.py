@@ -91,6 +91,15 @@ def put_craft(instance: Any, craft: Craft) -> None:
         setter([reference(field.name)], [getattr(craft, field.name)])
 
 
+def put_all(instance: Any, craft: Craft, state: State, held: Controls) -> None:
+    """Anew, in continuous-time mode."""
+    instance.reset()
+    put_craft(instance, craft)
+    go(instance)
+    put_states(instance, state)
+    instance.setReal([reference(name) for name in INPUTS], list(held))
+
+
 # ---- phases
 
 
@@ -360,11 +369,7 @@ def test_all_that_is_read_follows_states_and_inputs_at_once(
 ) -> None:
     """As the bare model has it; the FMU brings its own sine and cosine."""
     instance, _ = shared
-    instance.reset()
-    put_craft(instance, craft)
-    go(instance)
-    put_states(instance, state)
-    instance.setReal([reference(name) for name in INPUTS], list(held))
+    put_all(instance, craft, state, held)
     instance.setTime(3.0)
     expected = derivatives(state, held, craft)
     scale = 1.0 + max(map(abs, expected))
@@ -562,11 +567,7 @@ def test_partial_derivatives_are_those_of_the_model(
     craft: Craft, state: State, held: Controls, shared: tuple[Any, list[str]]
 ) -> None:
     instance, _ = shared
-    instance.reset()
-    put_craft(instance, craft)
-    go(instance)
-    put_states(instance, state)
-    instance.setReal([reference(name) for name in INPUTS], list(held))
+    put_all(instance, craft, state, held)
     assert_close(jacobian(instance), by_complex_steps(state, held, craft))
 
 

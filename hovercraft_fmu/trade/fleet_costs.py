@@ -1,6 +1,5 @@
 """Would a fleet as arrays, which only FMI 3.0 allows, be cheaper than as many instances? Side by side in one run."""
 
-import csv
 import platform
 import subprocess
 import sys
@@ -9,12 +8,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rich.console import Group
-from rich.table import Table
 
 from .. import hosts
 from ..fmu.description import NATIVE3
 from ..fmu.native_package import PLATFORMS, compiler, has_compiler, sources
-from ..view.tables import markdown
+from .rows import write_costs
 
 SOURCE = Path(__file__).parent / "fleet_costs.c"
 CRAFT = 1000
@@ -72,18 +70,7 @@ def run(folder: Path) -> Group:
     """Measure, write fleet.csv and fleet.md into `folder`, and return what to print."""
     if reason := missing():
         return Group(f"\nno costs of a fleet: {reason}")
-    costs = measure()
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "fleet.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*Cost._fields, "ratio"])
-        writer.writerows([*cost, cost.ratio] for cost in costs)
-    (folder / "fleet.md").write_text(markdown(TITLES, map(_cells, costs)) + "\n", encoding="utf-8")
-    table = Table(box=None, pad_edge=False)
-    for title in TITLES:
-        table.add_column(title)
-    for cost in costs:
-        table.add_row(*_cells(cost))
+    table = write_costs(folder / "fleet", measure(), _cells, TITLES)
     return Group(f"\nWhat a fleet of {CRAFT} craft in one instance could save", table)
 
 

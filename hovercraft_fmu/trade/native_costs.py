@@ -1,6 +1,5 @@
 """What the native FMU costs: a sub-step in C, and the calls of a host, beside the Python FMU; ratios in one run."""
 
-import csv
 import os
 import statistics
 import subprocess
@@ -13,7 +12,6 @@ from typing import Any, NamedTuple
 
 import fmpy
 from rich.console import Group
-from rich.table import Table
 
 from ..fmu.description import NATIVE
 from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
@@ -22,7 +20,7 @@ from ..fmu.package import build_fmu
 from ..hosts import compiler, python_library
 from ..model.integrators import INTEGRATORS
 from ..simulation import instantiated, read_description
-from ..view.tables import markdown
+from .rows import write_costs
 
 COMMUNICATION_STEPS = (0.01, 0.1, 1.0)
 """s"""
@@ -190,18 +188,7 @@ def run(folder: Path) -> Group:
     """Measure, write native.csv and native.md into the folder, and return what is to be printed."""
     if why := missing():
         return Group(f"\nThe native FMU was not measured: {why}")
-    costs = measure()
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "native.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*Cost._fields, "ratio"])
-        writer.writerows([*cost, cost.ratio] for cost in costs)
-    (folder / "native.md").write_text(markdown(TITLES, map(_cells, costs)) + "\n", encoding="utf-8")
-    table = Table(box=None, pad_edge=False)
-    for title in TITLES:
-        table.add_column(title)
-    for cost in costs:
-        table.add_row(*_cells(cost))
+    table = write_costs(folder / "native", measure(), _cells, TITLES)
     return Group(f"\nWhat {NATIVE.identifier} costs", table)
 
 

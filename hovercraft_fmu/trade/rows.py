@@ -1,9 +1,15 @@
-"""What is measured: a row a run."""
+"""What is measured: a row a run; how costs are written."""
 
+import csv
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.table import Table
 
 from ..simulation import method_in_words
+from ..view.tables import markdown
 
 
 class Setting(NamedTuple):
@@ -56,3 +62,21 @@ class Holding(NamedTuple):
     """s"""
     position_error: float
     """m, at the end"""
+
+
+def write_costs(
+    path: Path, costs: Sequence[Any], cells: Callable[[Any], tuple[str, ...]], titles: Sequence[str]
+) -> Table:
+    """Write costs (tuples with a `ratio`) to path.csv, and as cells under titles to path.md; return that table."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.with_suffix(".csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*costs[0]._fields, "ratio"])
+        writer.writerows([*cost, cost.ratio] for cost in costs)
+    path.with_suffix(".md").write_text(markdown(titles, map(cells, costs)) + "\n", encoding="utf-8")
+    table = Table(box=None, pad_edge=False)
+    for title in titles:
+        table.add_column(title)
+    for cost in costs:
+        table.add_row(*cells(cost))
+    return table
