@@ -224,6 +224,24 @@ def test_adjoint_derivatives_in_initialization_mode(instance: Any) -> None:
     assert_transposed(instance, INITIAL_UNKNOWNS, INITIAL_KNOWNS, 8 + 26 + 3 + 3 * 9 + 1)
 
 
+# ---- FMU state
+
+
+def test_a_deserialized_state_is_a_copy_of_its_own(instance: Any) -> None:
+    """Of getting a state the standard says what the pointer may be on entry, of deserializing not: it is not read."""
+    start(instance)
+    held = instance.getFMUState()
+    instance.doStep(0.0, 0.1)
+    after = everything(instance)
+    content = instance.serializeFMUState(instance.getFMUState())
+    made = instance.deserializeFMUState(content, fmi3.fmi3FMUState(held.value))
+    assert made.value != held.value
+    instance.setFMUState(held)
+    assert instance.getFloat64([TIME.reference]) == [0.0]
+    instance.setFMUState(made)
+    assert everything(instance) == after
+
+
 # ---- every function
 
 

@@ -468,8 +468,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[]
         return refuse_null(c, "fmi3DeserializeFMUState");
     if (instance_deserialize(&c->instance, bytes, size, &content) == REFUSED)
         return fmi3Error;
-    if (!*state)
-        *state = memory_allocate(1, sizeof content);
+    *state = memory_allocate(1, sizeof content); /* unlike fmi3GetFMUState: what it was may be anything */
     if (!*state)
         return refuse(c, "fmi3DeserializeFMUState", "no memory");
     *(struct content *)*state = content;
