@@ -338,8 +338,12 @@ def test_an_input_outside_its_limits_is_told_once(instance: Any, messages: list[
     put(instance, thrust=99.0)
     assert get(instance, "applied.thrust", "acceleration.x") == [10.0, 0.1]
     assert (count(instance, "warnings"), messages) == (0, [])
-    instance.completedIntegratorStep()
-    instance.completedIntegratorStep()
+    assert instance.completedIntegratorStep() == (True, False)
+    assert (count(instance, "warnings"), messages) == (0, [])  # it is discrete: it changes in event mode alone
+    instance.enterEventMode()
+    instance.newDiscreteStates()
+    instance.enterContinuousTimeMode()
+    assert instance.completedIntegratorStep() == (False, False)
     instance.enterEventMode()
     instance.newDiscreteStates()
     assert messages == ["thrust = 99.0: is outside its limits and is held at 10.0 (said once)"]

@@ -193,7 +193,10 @@ def solved(calls: Calls, tolerance: float) -> tuple[float, State, int]:
             time = point
             instance.setTime(time)
             calls.put(current.at(time))
-            instance.completedIntegratorStep()
+            if instance.completedIntegratorStep()[0]:
+                instance.enterEventMode()
+                instance.newDiscreteStates()
+                instance.enterContinuousTimeMode()
             calls.get()
     seconds = perf_counter() - begun
     if calls.messages:

@@ -29,7 +29,7 @@ enum verdict instance_new_discrete_states(struct instance *instance, const char 
 }
 
 /* A solver may look ahead of the stop time, and comes back from there; a step that it has completed stands. */
-enum verdict instance_completed_integrator_step(struct instance *instance, const char *call)
+enum verdict instance_completed_integrator_step(struct instance *instance, const char *call, bool *event_needed)
 {
     const double time = instance->now.time, stop_time = instance->now.stop_time;
     if (instance_require(instance, call, CONTINUOUS_TIME) == REFUSED)
@@ -38,7 +38,8 @@ enum verdict instance_completed_integrator_step(struct instance *instance, const
         return instance_say(instance, REFUSED, "%s at %r s: must not lead past stopTime = %r s", call, time, stop_time);
     if (instance_take_up(instance) == REFUSED)
         return REFUSED;
-    return instance_warn_of_held_inputs(instance, &instance->now.controls);
+    *event_needed = instance_has_to_warn(instance);
+    return FINE;
 }
 
 /* ---- time, states, derivatives */

@@ -388,10 +388,12 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Boolean no_s
         return fmi2Error;
     if (!enter_event_mode || !terminate)
         return refuse_null(c, "fmi2CompletedIntegratorStep");
-    const enum verdict verdict = instance_completed_integrator_step(&c->instance, "fmi2CompletedIntegratorStep");
-    if (verdict != REFUSED)
-        *enter_event_mode = *terminate = fmi2False;
-    return status_of(verdict);
+    bool event_needed = false;
+    if (instance_completed_integrator_step(&c->instance, "fmi2CompletedIntegratorStep", &event_needed) == REFUSED)
+        return fmi2Error;
+    *enter_event_mode = event_needed ? fmi2True : fmi2False;
+    *terminate = fmi2False;
+    return fmi2OK;
 }
 
 fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time)

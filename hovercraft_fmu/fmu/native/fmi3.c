@@ -540,10 +540,12 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean no_set
     (void)no_set_state_before;
     if (!c || !enter_event_mode || !terminate)
         return refuse_null(c, "fmi3CompletedIntegratorStep");
-    const enum verdict verdict = instance_completed_integrator_step(&c->instance, "fmi3CompletedIntegratorStep");
-    if (verdict != REFUSED)
-        *enter_event_mode = *terminate = false;
-    return status_of(verdict);
+    bool event_needed = false;
+    if (instance_completed_integrator_step(&c->instance, "fmi3CompletedIntegratorStep", &event_needed) == REFUSED)
+        return fmi3Error;
+    *enter_event_mode = event_needed;
+    *terminate = false;
+    return fmi3OK;
 }
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)

@@ -292,6 +292,11 @@ static bool is_first(struct instance *instance, int bit)
     return first;
 }
 
+static bool is_held(double value, double limit)
+{
+    return fabs(value - limit) > HELD * larger(1.0, fabs(limit));
+}
+
 static const struct method *method_of(const struct instance *instance)
 {
     return &METHODS[instance->now.settings.integrator - 1];
@@ -325,10 +330,19 @@ enum verdict instance_warn_of_held_inputs(struct instance *instance, const struc
     const double held[] = {limits.thrust, limits.port, limits.starboard};
     enum verdict verdict = FINE;
     for (unsigned i = 0; i < sizeof held / sizeof *held; i++)
-        if (fabs(values[i] - held[i]) > HELD * larger(1.0, fabs(held[i])) && is_first(instance, INPUT_HELD))
+        if (is_held(values[i], held[i]) && is_first(instance, INPUT_HELD))
             verdict = instance_say(instance, WARNED, "%s = %r: is outside its limits and is held at %r (said once)",
                                    VARIABLES[INPUTS[i]].name, values[i], held[i]);
     return verdict;
+}
+
+bool instance_has_to_warn(const struct instance *instance)
+{
+    const struct controls *controls = &instance->now.controls;
+    const struct controls limits = kernel_saturate(controls, &instance->now.craft);
+    return !(instance->now.integers[V_WARNINGS] & INPUT_HELD) &&
+           (is_held(controls->thrust, limits.thrust) || is_held(controls->port, limits.port) ||
+            is_held(controls->starboard, limits.starboard));
 }
 
 static enum verdict count_substeps(struct instance *instance, int64_t n)

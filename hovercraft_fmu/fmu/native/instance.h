@@ -79,11 +79,12 @@ enum verdict instance_step(struct instance *instance, const char *call, double p
 enum verdict instance_terminate(struct instance *instance, const char *call);
 
 /* Model exchange (exchange.c): from initialization it goes to event mode, from there to and fro between that and
-   continuous-time mode. What is read follows states, inputs and parameters at once. It has no events of its own. */
+   continuous-time mode. What is read follows states, inputs and parameters at once. Its one event is a warning. */
 enum verdict instance_enter_event_mode(struct instance *instance, const char *call);
 enum verdict instance_enter_continuous_time(struct instance *instance, const char *call);
 enum verdict instance_new_discrete_states(struct instance *instance, const char *call);
-enum verdict instance_completed_integrator_step(struct instance *instance, const char *call);
+/* An event is needed where there is something to warn of: `warnings` is discrete, so it changes in event mode alone. */
+enum verdict instance_completed_integrator_step(struct instance *instance, const char *call, bool *event_needed);
 enum verdict instance_set_time(struct instance *instance, const char *call, double time);
 /* In the order of STATES; `n` must be STATE_COUNT. */
 enum verdict instance_set_states(struct instance *instance, const char *call, const double *values, size_t n);
@@ -126,6 +127,8 @@ enum verdict instance_get_rates(struct instance *instance, const unsigned *refer
    model exchange; refused where the parameters contradict one another. And a word where inputs are out of limits. */
 enum verdict instance_take_up(struct instance *instance);
 enum verdict instance_warn_of_held_inputs(struct instance *instance, const struct controls *controls);
+/* Whether that word is still to be said of the inputs as they are now. */
+bool instance_has_to_warn(const struct instance *instance);
 
 /* Take up a content as a whole. Refused: one of another use. */
 enum verdict instance_restore(struct instance *instance, const struct content *content);
