@@ -17,7 +17,7 @@
 #include "kernel.h"
 #include "variables.h"
 
-enum { SAMPLES = 21, MOST_CASES = 16, SUBSTEPS = 20000, ALIVE = 100 };
+enum { SAMPLES = 21, MOST_CASES = 16, SUBSTEPS = 20000, ALIVE = 2000 };
 static const double STEP_SIZE = 0.001;  /* s */
 static const double TOLERANCE = 1e-12;  /* SI units, of the adaptive method: thousands of its own steps in that time */
 
