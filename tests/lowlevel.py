@@ -8,7 +8,7 @@ from typing import Any
 from fmpy import fmi2, fmi3
 
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, VARIABLES
-from hovercraft_fmu.simulation import instantiated, is_fmi_3, read_description
+from hovercraft_fmu.simulation import CALLBACKS, instantiated, is_fmi_3, read_description
 
 REALS = [v for v in VARIABLES if v.kind == "Real"]
 INTEGERS = [v for v in VARIABLES if v.kind != "Real"]
@@ -140,5 +140,8 @@ def another(instance: Any) -> Any:
         modelIdentifier=instance.modelIdentifier,
         instanceName="another",
     )
-    made.instantiate(loggingOn=True)
-    return Instance3(made) if isinstance(instance, Instance3) else made
+    if isinstance(instance, Instance3):
+        made.instantiate(loggingOn=True)
+        return Instance3(made)
+    made.instantiate(callbacks=CALLBACKS, loggingOn=True)
+    return made

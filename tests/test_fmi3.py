@@ -90,8 +90,7 @@ def _exchanged(run: Any, fmu: Path) -> NDArray[np.void]:
         output_interval=run.communication_step,
         start_values=dict(run.start_values),
         input=run.signals,
-        output=names,
-        logger=lambda *_: None,
+        output=names,  # and no logger: fmpy would call it for other instances when it is long gone
     )
     return np.asarray(found)
 
