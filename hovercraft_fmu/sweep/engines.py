@@ -287,7 +287,8 @@ class _Batch:
         everyone = np.ones(len(group))
         start: list[Any] = [samples.get(name, plan.run.value(name)) * everyone for name in STATES]
         self._state = State(*start)
-        self._stability, self._rotation = np.zeros(len(group)), np.zeros(len(group))
+        self._stability: NDArray[np.float64] = np.zeros(len(group))
+        self._rotation: NDArray[np.float64] = np.zeros(len(group))
         self._held = np.zeros(len(group), bool)
 
     def go(self) -> None:

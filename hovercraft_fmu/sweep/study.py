@@ -82,7 +82,8 @@ class Factor:
             found: NDArray[Any] = self.distribution.ppf(part)
             return found
         chosen = np.minimum((part * len(self.values)).astype(np.int64), len(self.values) - 1)
-        return np.array(self.values, self.kind)[chosen]
+        items: NDArray[Any] = np.array(self.values, self.kind)
+        return np.take(items, chosen)
 
 
 @dataclass(frozen=True)

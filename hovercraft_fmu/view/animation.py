@@ -366,7 +366,8 @@ def _write_page(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
 def _kept(track: Track) -> NDArray[np.int_]:
     """The communication points of a path that are in a page."""
     n = len(track.x)
-    return np.unique(np.linspace(0, n - 1, min(n, PATH_POINTS)).astype(int))
+    points: NDArray[np.int_] = np.linspace(0, n - 1, min(n, PATH_POINTS)).astype(int)
+    return np.unique(points)
 
 
 def _path_trace(track: Track, dash: str) -> dict[str, Any]:
