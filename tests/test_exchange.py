@@ -493,7 +493,7 @@ def test_a_state_of_the_other_use_is_refused(instance: Any, messages: list[str],
 # ---- partial derivatives
 
 
-class Analytic(NDArray[Any]):
+class Analytic(np.ndarray[Any, np.dtype[Any]]):  # not NDArray, which newer numpy has as an alias
     """A complex number whose absolute value is that of the real function: continued, with the slope 0 at 0."""
 
     def __abs__(self) -> "Analytic":
