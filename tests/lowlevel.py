@@ -145,3 +145,13 @@ def another(instance: Any) -> Any:
         return Instance3(made)
     made.instantiate(callbacks=CALLBACKS, loggingOn=True)
     return made
+
+
+def kept(instance: Any, through_bytes: bool) -> Any:
+    """The state of an instance, as it is or made again from what it was serialized to."""
+    state = instance.getFMUstate()
+    if not through_bytes:
+        return state
+    content = instance.serializeFMUstate(state)
+    instance.freeFMUstate(state)
+    return instance.deSerializeFMUstate(content)

@@ -43,7 +43,7 @@ from hovercraft_fmu.trade.model_exchange import SMOOTH, TOLERANCES, Calls, solve
 from hovercraft_fmu.trade.reference import reference_end
 from hovercraft_fmu.trade.work_precision import STOP_TIME
 from tests.conftest import FMI_2
-from tests.lowlevel import CONTINUOUS, Instance3, count, everything, get, one, put, reference, start, worded
+from tests.lowlevel import CONTINUOUS, Instance3, count, everything, get, kept, one, put, reference, start, worded
 from tests.strategies import crafts, numbers, rubbing_crafts
 from tests.test_lifecycle import FAULTS
 
@@ -443,15 +443,10 @@ def test_any_sequence_of_states_inputs_saves_and_restores(
             instance.enterContinuousTimeMode()
             now = (state, held, value)
         elif name == "save":
-            kept = instance.getFMUstate()
-            if value:  # through bytes
-                content = instance.serializeFMUstate(kept)
-                instance.freeFMUstate(kept)
-                kept = instance.deSerializeFMUstate(content)
-            saved.append((kept, now))
+            saved.append((kept(instance, through_bytes=value), now))
         elif name == "restore" and saved:
-            kept, now = saved[value % len(saved)]
-            instance.setFMUstate(kept)
+            before, now = saved[value % len(saved)]
+            instance.setFMUstate(before)
         elif name == "fault":
             with pytest.raises(FMICallException):
                 OWN_FAULTS[value][0](instance)
@@ -459,8 +454,8 @@ def test_any_sequence_of_states_inputs_saves_and_restores(
         expected = derivatives(state, held, Craft(air_density=density))
         assert get_vector(instance.getContinuousStates) == list(state)
         assert get_vector(instance.getDerivatives) == pytest.approx(expected, rel=1e-11, abs=1e-9)
-    for kept, _ in saved:
-        instance.freeFMUstate(kept)
+    for state, _ in saved:
+        instance.freeFMUstate(state)
 
 
 @pytest.mark.parametrize("phase", EVERYWHERE)

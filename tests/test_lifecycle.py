@@ -33,7 +33,7 @@ from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
 from tests.blobs import with_build, with_substeps
 from tests.conftest import Fresh
-from tests.lowlevel import CONTINUOUS, another, count, everything, get, one, put, reference, start, worded
+from tests.lowlevel import CONTINUOUS, another, count, everything, get, kept, one, put, reference, start, worded
 from tests.strategies import numbers
 
 STATUS = {
@@ -433,12 +433,7 @@ def test_any_sequence_of_steps_inputs_saves_and_restores(
             put(instance, air_density=value)
             oracle = oracle._replace(density=value)
         elif name == "save":
-            state = instance.getFMUstate()
-            if value:  # through bytes
-                content = instance.serializeFMUstate(state)
-                instance.freeFMUstate(state)
-                state = instance.deSerializeFMUstate(content)
-            saved.append((state, oracle))
+            saved.append((kept(instance, through_bytes=value), oracle))
         elif name == "restore" and saved:
             state, oracle = saved[value % len(saved)]
             instance.setFMUstate(state)

@@ -30,7 +30,7 @@ SPOILED = {
     ),
     "exchange.c": (
         "    struct content *now = &instance->now;\n",
-        "    if (now->phase == CONTINUOUS_TIME && n > 0 && isfinite(values[0]))\n"
+        "    if (now->phase == CONTINUOUS_TIME && values && n > 0 && isfinite(values[0]))\n"
         "        now->state.x = values[0], now->moved = true;\n",
     ),
     "partials.c": (

@@ -7,11 +7,10 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "calls.h"
+#include "costs.h"
 #include "kernel.h"
 #include "trig.h"
 #include "variables.h"
@@ -29,21 +28,6 @@ struct lanes {
     double most[LANES], left[LANES], right[LANES];          /* what is watched, as in kernel.c */
     double stability[LANES], rotation[LANES];               /* 1, rad: the largest so far */
 };
-
-static double now(void)
-{
-    struct timespec time;
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
-
-static void demand(int good, const char *what)
-{
-    if (!good) {
-        fprintf(stderr, "%s failed\n", what);
-        exit(1);
-    }
-}
 
 /* trig.h without its rare cases, and without a branch: for headings below 2^20 quarter turns, not next to one. */
 static inline void sine_cosine(double angle, double *sine, double *cosine)

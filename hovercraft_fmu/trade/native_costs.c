@@ -10,9 +10,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "costs.h"
 #include "fmi2FunctionTypes.h"
 #include "kernel.h"
 #include "variables.h"
@@ -54,21 +54,6 @@ struct outcome_of_case {
     char name[64];
     double samples[SAMPLES];
 };
-
-static double now(void)
-{
-    struct timespec time;
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
-
-static void demand(int good, const char *what)
-{
-    if (!good) {
-        fprintf(stderr, "%s failed\n", what);
-        exit(1);
-    }
-}
 
 static long resident(void)
 {

@@ -54,8 +54,10 @@ enum verdict instance_set_time(struct instance *instance, const char *call, doub
     return FINE;
 }
 
-static enum verdict check_count(struct instance *instance, const char *call, size_t n)
+static enum verdict check_array(struct instance *instance, const char *call, const double *values, size_t n)
 {
+    if (!values)
+        return instance_say(instance, REFUSED, "%s: no argument must be NULL", call);
     if (n == STATE_COUNT)
         return FINE;
     return instance_say(instance, REFUSED, "%s: %u values: must be %u, one for each state", call,
@@ -65,7 +67,8 @@ static enum verdict check_count(struct instance *instance, const char *call, siz
 enum verdict instance_set_states(struct instance *instance, const char *call, const double *values, size_t n)
 {
     struct content *now = &instance->now;
-    if (instance_require(instance, call, CONTINUOUS_TIME) == REFUSED || check_count(instance, call, n) == REFUSED)
+    if (check_array(instance, call, values, n) == REFUSED ||
+        instance_require(instance, call, CONTINUOUS_TIME) == REFUSED)
         return REFUSED;
     for (unsigned i = 0; i < STATE_COUNT; i++)
         if (!isfinite(values[i]))
@@ -80,7 +83,8 @@ enum verdict instance_set_states(struct instance *instance, const char *call, co
 static enum verdict get(struct instance *instance, const char *call, const unsigned *references, double *values,
                         size_t n)
 {
-    if (instance_require_use(instance, call, MODEL_EXCHANGE) == REFUSED || check_count(instance, call, n) == REFUSED)
+    if (check_array(instance, call, values, n) == REFUSED ||
+        instance_require_use(instance, call, MODEL_EXCHANGE) == REFUSED)
         return REFUSED;
     if (instance->now.phase == INSTANTIATED)
         return instance_require(instance, call, INITIALIZING);
@@ -99,7 +103,8 @@ enum verdict instance_get_derivatives(struct instance *instance, const char *cal
 
 enum verdict instance_get_nominals(struct instance *instance, const char *call, double *values, size_t n)
 {
-    if (instance_require_use(instance, call, MODEL_EXCHANGE) == REFUSED || check_count(instance, call, n) == REFUSED)
+    if (check_array(instance, call, values, n) == REFUSED ||
+        instance_require_use(instance, call, MODEL_EXCHANGE) == REFUSED)
         return REFUSED;
     for (unsigned i = 0; i < STATE_COUNT; i++)
         values[i] = NOMINALS[i];

@@ -557,33 +557,27 @@ fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
 fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 states[], size_t n)
 {
     struct component *c = instance;
-    if (!c || !states)
-        return refuse_null(c, "fmi3SetContinuousStates");
-    return status_of(instance_set_states(&c->instance, "fmi3SetContinuousStates", states, n));
+    return c ? status_of(instance_set_states(&c->instance, "fmi3SetContinuousStates", states, n)) : fmi3Error;
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 states[], size_t n)
 {
     struct component *c = instance;
-    if (!c || !states)
-        return refuse_null(c, "fmi3GetContinuousStates");
-    return status_of(instance_get_states(&c->instance, "fmi3GetContinuousStates", states, n));
+    return c ? status_of(instance_get_states(&c->instance, "fmi3GetContinuousStates", states, n)) : fmi3Error;
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[], size_t n)
 {
     struct component *c = instance;
-    if (!c || !derivatives)
-        return refuse_null(c, "fmi3GetContinuousStateDerivatives");
-    return status_of(instance_get_derivatives(&c->instance, "fmi3GetContinuousStateDerivatives", derivatives, n));
+    return c ? status_of(instance_get_derivatives(&c->instance, "fmi3GetContinuousStateDerivatives", derivatives, n))
+             : fmi3Error;
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t n)
 {
     struct component *c = instance;
-    if (!c || !nominals)
-        return refuse_null(c, "fmi3GetNominalsOfContinuousStates");
-    return status_of(instance_get_nominals(&c->instance, "fmi3GetNominalsOfContinuousStates", nominals, n));
+    return c ? status_of(instance_get_nominals(&c->instance, "fmi3GetNominalsOfContinuousStates", nominals, n))
+             : fmi3Error;
 }
 
 static fmi3Status tell_number(struct component *c, const char *call, size_t *n, size_t number)

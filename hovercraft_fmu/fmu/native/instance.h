@@ -86,7 +86,7 @@ enum verdict instance_new_discrete_states(struct instance *instance, const char 
 /* An event is needed where there is something to warn of: `warnings` is discrete, so it changes in event mode alone. */
 enum verdict instance_completed_integrator_step(struct instance *instance, const char *call, bool *event_needed);
 enum verdict instance_set_time(struct instance *instance, const char *call, double time);
-/* In the order of STATES; `n` must be STATE_COUNT. */
+/* In the order of STATES; `values` must not be NULL, `n` must be STATE_COUNT. */
 enum verdict instance_set_states(struct instance *instance, const char *call, const double *values, size_t n);
 enum verdict instance_get_states(struct instance *instance, const char *call, double *values, size_t n);
 enum verdict instance_get_derivatives(struct instance *instance, const char *call, double *values, size_t n);
