@@ -27,7 +27,8 @@ from .._version import __version__
 from ..fmu.description import MODEL_NAME
 from ..model.integrators import INTEGRATORS
 from ..simulation import SimulationError, default_fmu, read_description
-from .engines import SETTINGS, Driver, Plan, run_batch
+from .batch import run_batch
+from .engines import SETTINGS, Driver, Plan
 from .quantities import quantity_function, row_columns
 from .store import Store, runs_table, trajectories_table
 from .study import Samples, Study, read_study
