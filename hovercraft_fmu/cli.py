@@ -25,12 +25,12 @@ from rich.table import Table
 from rich.text import Text
 
 from ._version import __version__
-from .autopilot.interface import AUTOPILOT
-from .autopilot.package import build_autopilot
+from .autopilot.pilot_interface import AUTOPILOT
+from .autopilot.pilot_package import build_autopilot
 from .coupling import Passage, sail
 from .fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from .fmu.native_package import build_native_fmu, has_compiler
-from .fmu.package import build_fmu
+from .fmu.python_package import build_fmu
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES, VOYAGES
 from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, default_fmu, plan, simulate

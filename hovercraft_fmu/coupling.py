@@ -13,8 +13,8 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from .autopilot.guidance import Commands, Gains, Pilot, Sight, Waypoint, steer
-from .autopilot.interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
-from .autopilot.package import build_autopilot
+from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
+from .autopilot.pilot_package import build_autopilot
 from .fmu.description import HOVERCRAFT
 from .fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES, Model
 from .model.craft import Craft

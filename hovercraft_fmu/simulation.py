@@ -34,7 +34,7 @@ from .fmu.interface import (
     observe_action,
     observe_motion,
 )
-from .fmu.package import build_fmu
+from .fmu.python_package import build_fmu
 from .model.craft import Craft, preset
 from .model.dynamics import Controls, State
 from .model.integrators import integrator

@@ -6,11 +6,11 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 from ._version import RELEASE_DATE, __version__
-from .autopilot.interface import AUTOPILOT_MODEL, COMMANDS
+from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
 from .fmu.description import AUTHOR, HOVERCRAFT
 from .fmu.extras import xml
 from .fmu.interface import STATES, Variable
-from .fmu.package import write_archive, zipped
+from .fmu.python_package import write_archive, zipped
 from .scenes import VOYAGES, Voyage
 
 CRAFT, PILOT = "hovercraft", "autopilot"

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 
 from hovercraft_fmu import build_fmu
-from hovercraft_fmu.autopilot.package import build_autopilot
+from hovercraft_fmu.autopilot.pilot_package import build_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.native_package import build_native_fmu, has_compiler
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from hovercraft_fmu.autopilot.guidance import Gains, Pilot, Waypoint, steer
-from hovercraft_fmu.autopilot.interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, GAINS, VARIABLES
+from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, GAINS, VARIABLES
 from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, STATES
 from hovercraft_fmu.model.dynamics import State
 from hovercraft_fmu.simulation import plan, read_description, run_fmu
@@ -104,7 +104,7 @@ def test_names_units_and_structure(autopilot: Path) -> None:
 
 
 def test_the_same_bytes_elsewhere(autopilot: Path, fresh: Fresh, tmp_path: Path) -> None:
-    code = "from hovercraft_fmu.autopilot.package import build_autopilot; build_autopilot()"
+    code = "from hovercraft_fmu.autopilot.pilot_package import build_autopilot; build_autopilot()"
     fresh(code, env={"TZ": "Pacific/Auckland"})
     again = tmp_path / "build" / "Autopilot.fmu"
     assert hashlib.sha256(again.read_bytes()).digest() == hashlib.sha256(autopilot.read_bytes()).digest()

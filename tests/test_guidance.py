@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hovercraft_fmu.autopilot import guidance
 from hovercraft_fmu.autopilot.guidance import Commands, Gains, Pilot, Waypoint, check_gain, steer
-from hovercraft_fmu.autopilot.interface import DEMO_COURSE
+from hovercraft_fmu.autopilot.pilot_interface import DEMO_COURSE
 from hovercraft_fmu.model.craft import Craft, preset
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import integrator

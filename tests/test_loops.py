@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from lxml import etree
 from PIL import Image
 
-from hovercraft_fmu.autopilot.interface import COMMANDS
+from hovercraft_fmu.autopilot.pilot_interface import COMMANDS
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.coupling import (
     COLUMNS,
@@ -41,7 +41,7 @@ from hovercraft_fmu.trade import coupling as study
 from tests.conftest import ROOT
 
 RK4 = Settings(0.1, integrator(3))
-RESULTS = ROOT / "hovercraft_fmu" / "fmu" / "documentation" / "results"
+RESULTS = ROOT / "hovercraft_fmu" / "studies" / "results"
 SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
 
 

@@ -26,7 +26,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from hovercraft_fmu import simulate
-from hovercraft_fmu.autopilot.package import build_autopilot
+from hovercraft_fmu.autopilot.pilot_package import build_autopilot
 from hovercraft_fmu.cli import main
 from hovercraft_fmu.fmu.interface import STEP_UNSTABLE
 from hovercraft_fmu.model.dynamics import Controls
@@ -707,7 +707,7 @@ def test_the_benchmark(fmu: Path, native_fmu: Path) -> None:
 
 
 def test_the_readme_shows_what_is_committed() -> None:
-    table = (ROOT / "hovercraft_fmu" / "fmu" / "documentation" / "results" / "sweep.md").read_text(encoding="utf-8")
+    table = (ROOT / "hovercraft_fmu" / "studies" / "results" / "sweep.md").read_text(encoding="utf-8")
     assert table in (ROOT / "README.md").read_text(encoding="utf-8")
 
 

@@ -27,7 +27,7 @@ from hovercraft_fmu.trade.work_precision import (
 )
 from tests.conftest import ROOT
 
-RESULTS = ROOT / "hovercraft_fmu" / "fmu" / "documentation" / "results"
+RESULTS = ROOT / "hovercraft_fmu" / "studies" / "results"
 
 
 def records(path: Path) -> list[dict[str, str]]:

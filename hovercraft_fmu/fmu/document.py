@@ -15,7 +15,7 @@ from .description import DESCRIPTION, FMI_3_TYPES, NATIVE, NATIVE3, PYTHON, Flav
 from .interface import ACTION, MOTION, STATES, VARIABLES, WARNINGS, WATCHED, Variable
 
 FOLDER = Path(__file__).parent / "documentation"
-RESULTS = FOLDER / "results"
+RESULTS = Path(__file__).parent.parent / "studies" / "results"
 """What `hovercraft-fmu trade` and `hovercraft-fmu stability` wrote, with `--output` there."""
 STUDY = Path(__file__).parent.parent / "sweep" / "studies" / "turning_circle.toml"
 """The study that the page on sweeps explains."""

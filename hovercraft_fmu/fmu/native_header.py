@@ -29,8 +29,8 @@ from .interface import (
     Enumeration,
     Variable,
 )
-from .life_cycle import SAME_TIME, Phase, may_be_set
-from .slave import HELD
+from .python.life_cycle import SAME_TIME, Phase, may_be_set
+from .python.slave import HELD
 
 HEADER = """\
 /* Made from hovercraft_fmu/fmu/interface.py. */

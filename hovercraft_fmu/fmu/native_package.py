@@ -18,7 +18,7 @@ from .extras import build_description, terminals_and_icons, xml
 from .icon import icon_png
 from .mach_o import universal
 from .native_header import variables_header
-from .package import digest, documents, write_fmu, zipped
+from .python_package import digest, documents, write_fmu, zipped
 
 C_FOLDER = Path(__file__).parent / "native"
 FMI_HEADERS = {

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from ..autopilot.interface import AUTOPILOT_MODEL, COMMANDS
+from ..autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
 from ..fmu.description import HOVERCRAFT
 from ..fmu.extras import xml
 from ..fmu.interface import STATES, Model

@@ -19,7 +19,7 @@ from ..fmu.interface import (
     observe_action,
     observe_motion,
 )
-from ..fmu.slave import HELD
+from ..fmu.python.slave import HELD
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State, saturate
 from ..model.subcycling import Settings, advance, stability_number

@@ -18,7 +18,7 @@ from rich.table import Table
 
 from ..fmu.interface import STATES
 from ..fmu.native_package import build_native_fmu
-from ..fmu.package import build_fmu
+from ..fmu.python_package import build_fmu
 from ..simulation import plan
 from ..trade.work_precision import machine
 from ..view.tables import markdown

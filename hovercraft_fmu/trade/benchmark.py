@@ -14,7 +14,7 @@ from rich.console import Group
 from rich.table import Table
 
 from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
-from ..fmu.package import build_fmu
+from ..fmu.python_package import build_fmu
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State
 from ..model.subcycling import Settings, advance

@@ -16,7 +16,7 @@ from rich.console import Group
 from ..fmu.description import NATIVE
 from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
 from ..fmu.native_package import build_native_fmu, has_compiler, sources
-from ..fmu.package import build_fmu
+from ..fmu.python_package import build_fmu
 from ..hosts import compiler, python_library
 from ..model.integrators import INTEGRATORS
 from ..simulation import instantiated, read_description

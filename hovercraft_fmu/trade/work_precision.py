@@ -20,7 +20,7 @@ from rich.table import Table
 
 from .._version import __version__
 from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
-from ..fmu.package import build_fmu
+from ..fmu.python_package import build_fmu
 from ..model.dynamics import Controls, State, windy
 from ..model.subcycling import advance
 from ..scenes import SCENES, Scene

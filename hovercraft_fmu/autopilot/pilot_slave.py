@@ -3,10 +3,10 @@
 from typing import Any
 
 from ..fmu.interface import STATES, Variable
-from ..fmu.life_cycle import Slave, refuse_non_finite
+from ..fmu.python.life_cycle import Slave, refuse_non_finite
 from ..model.dynamics import State
 from .guidance import Commands, Gains, Pilot, Sight, Waypoint, check_gain, steer
-from .interface import AUTOPILOT, AUTOPILOT_MODEL, COMMANDS, GAINS, WAYPOINTS_MAX, waypoint_names
+from .pilot_interface import AUTOPILOT, AUTOPILOT_MODEL, COMMANDS, GAINS, WAYPOINTS_MAX, waypoint_names
 
 BY_NAME = AUTOPILOT_MODEL.by_name
 MOTION = tuple(BY_NAME[name].reference for name in STATES)

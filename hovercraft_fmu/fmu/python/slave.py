@@ -3,10 +3,10 @@
 import math
 from typing import Any, NoReturn
 
-from ..model.craft import Craft, check_parameter
-from ..model.dynamics import Controls, State, saturate
-from ..model.integrators import integrator
-from ..model.subcycling import (
+from ...model.craft import Craft, check_parameter
+from ...model.dynamics import Controls, State, saturate
+from ...model.integrators import integrator
+from ...model.subcycling import (
     NonFiniteError,
     Settings,
     advance,
@@ -14,8 +14,8 @@ from ..model.subcycling import (
     check_tolerance,
     stability_number,
 )
-from .description import PYTHON
-from .interface import (
+from ..description import PYTHON
+from ..interface import (
     ACTION,
     BY_NAME,
     COUNTER_STOPPED,

@@ -8,9 +8,9 @@ from enum import Enum
 from typing import Any, ClassVar, TypeVar
 from xml.etree.ElementTree import Element
 
-from ..model.subcycling import check_tolerance
-from .description import Flavour, model_description
-from .interface import Variable
+from ...model.subcycling import check_tolerance
+from ..description import Flavour, model_description
+from ..interface import Variable
 from .wrapper import WrappedSlave, called_by_wrapper
 
 SAME_TIME = 1e-9

@@ -17,7 +17,7 @@ import pythonfmu
 from pythonfmu.builder import FmuBuilder
 
 from .description import PYTHON, Flavour
-from .document import pages
+from .document import RESULTS, pages
 from .icon import icon_png
 
 PACKAGE = Path(__file__).parent.parent
@@ -27,8 +27,9 @@ SHARED = (
     "fmu/__init__.py",
     "fmu/interface.py",
     "fmu/description.py",
-    "fmu/life_cycle.py",
-    "fmu/wrapper.py",
+    "fmu/python/__init__.py",
+    "fmu/python/life_cycle.py",
+    "fmu/python/wrapper.py",
 )
 """What of this package goes into every Python FMU, as patterns."""
 STATIC = Path(__file__).parent / "documentation"
@@ -139,10 +140,13 @@ def documents(flavour: Flavour) -> dict[str, bytes]:
         and path.suffix != ".jinja"
         and not (flavour.sources and path.name == "externalDependencies.txt")
     }
-    return {**static, **{name: page.encode() for name, page in pages(flavour).items()}}
+    measured = {f"results/{path.name}": path.read_bytes() for path in sorted(RESULTS.glob("*"))}
+    return {**static, **measured, **{name: page.encode() for name, page in pages(flavour).items()}}
 
 
-HOVERCRAFT_CONTENT = Content(PYTHON, "fmu.slave", "HovercraftSlave", ("fmu/slave.py",), lambda: documents(PYTHON))
+HOVERCRAFT_CONTENT = Content(
+    PYTHON, "fmu.python.slave", "HovercraftSlave", ("fmu/python/slave.py",), lambda: documents(PYTHON)
+)
 
 
 def _pythonfmu_license() -> bytes:

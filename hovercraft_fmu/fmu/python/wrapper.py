@@ -11,8 +11,8 @@ from typing import Concatenate, ParamSpec, TypeVar, cast
 from weakref import WeakSet
 
 try:  # inside the FMU: a copy under a name that no other module of the host's process has
-    from ..pythonfmu.enums import Fmi2Status
-    from ..pythonfmu.fmi2slave import Fmi2Slave
+    from ...pythonfmu.enums import Fmi2Status
+    from ...pythonfmu.fmi2slave import Fmi2Slave
 except ImportError:  # while the FMU is built
     from pythonfmu.enums import Fmi2Status
     from pythonfmu.fmi2slave import Fmi2Slave

@@ -4,9 +4,9 @@ import os
 from pathlib import Path
 
 from ..fmu.document import rendered
-from ..fmu.package import STATIC, Content, write_python_fmu
+from ..fmu.python_package import STATIC, Content, write_python_fmu
 from .guidance import __doc__ as law
-from .interface import AUTOPILOT, AUTOPILOT_MODEL
+from .pilot_interface import AUTOPILOT, AUTOPILOT_MODEL
 
 HERE = Path(__file__).parent
 PICTURE = "loop.png"
@@ -29,8 +29,8 @@ def _documents() -> dict[str, bytes]:
 
 CONTENT = Content(
     AUTOPILOT,
-    "autopilot.slave",
+    "autopilot.pilot_slave",
     "AutopilotSlave",
-    tuple(f"autopilot/{name}.py" for name in ("__init__", "guidance", "interface", "slave")),
+    tuple(f"autopilot/{name}.py" for name in ("__init__", "guidance", "pilot_interface", "pilot_slave")),
     _documents,
 )
