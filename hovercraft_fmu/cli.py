@@ -282,7 +282,7 @@ def _demo_of_the_loop(fmu: Path, autopilot: Path) -> None:
 @commands.command()
 def benchmark() -> None:
     """Measure what a step costs: reference loop, bare model, FMU through fmpy; side by side, as ratios."""
-    from .trade.benchmark import measure
+    from .studies.benchmark import measure
 
     OUTPUT.print(measure())
 
@@ -295,15 +295,14 @@ def benchmark() -> None:
 def trade(quick: bool, output: Path) -> None:
     """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes.
 
-    And what a solver of the host's costs beside the methods of the native FMU, and what a fleet as arrays could
-    save.
+    And what a solver of the host's costs beside the methods of the native FMU.
     """
-    from .trade import fleet_costs, model_exchange, native_costs, work_precision
+    from .studies import model_exchange, step_costs
+    from .studies import trade as work
 
-    _measure(lambda folder, tell: work_precision.run(folder, quick, tell), output)
+    _measure(lambda folder, tell: work.run(folder, quick, tell), output)
     OUTPUT.print(model_exchange.run(output, quick))
-    OUTPUT.print(native_costs.run(output))
-    OUTPUT.print(fleet_costs.run(output))
+    OUTPUT.print(step_costs.run(output))
 
 
 @commands.command()
@@ -312,7 +311,7 @@ def trade(quick: bool, output: Path) -> None:
 )
 def stability(output: Path) -> None:
     """Measure where each method breaks: limits of the step, and a random study of the extremes."""
-    from .trade import stability as study
+    from .studies import stability as study
 
     _measure(study.run, output)
 
@@ -323,7 +322,7 @@ def stability(output: Path) -> None:
 )
 def scene_terms(output: Path) -> None:
     """Measure what each opt-in term costs, and what leaving it out costs in accuracy, over the scenes."""
-    from .trade import scene_terms as study
+    from .studies import scene_terms as study
 
     _measure(study.run, output)
 
@@ -350,7 +349,7 @@ def sweep_command(
     from .sweep import read_study, sweep
 
     if benchmark:
-        from .sweep.benchmark import run
+        from .studies.sweep_costs import run
 
         return _measure(run, output or Path("build") / "sweep_benchmark")
     if study is None:
@@ -383,7 +382,7 @@ def sweep_command(
 )
 def coupling(output: Path) -> None:
     """Measure what the communication step of the closed loop costs, for two ways to couple, beside the integrator."""
-    from .trade import coupling as study
+    from .studies import closed_loop as study
 
     _measure(study.run, output)
 

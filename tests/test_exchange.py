@@ -39,9 +39,9 @@ from hovercraft_fmu.model.dynamics import (
 )
 from hovercraft_fmu.scenes import SCENES, Scene, held
 from hovercraft_fmu.simulation import SimulationError, plan, read_description
-from hovercraft_fmu.trade.model_exchange import SMOOTH, TOLERANCES, Calls, solved
-from hovercraft_fmu.trade.reference import reference_end
-from hovercraft_fmu.trade.work_precision import STOP_TIME
+from hovercraft_fmu.studies.model_exchange import SMOOTH, TOLERANCES, Calls, solved
+from hovercraft_fmu.studies.reference_end import reference_end
+from hovercraft_fmu.studies.trade import STOP_TIME
 from tests.conftest import FMI_2
 from tests.lowlevel import CONTINUOUS, Instance3, count, everything, get, kept, one, put, reference, start, worded
 from tests.strategies import crafts, numbers, rubbing_crafts

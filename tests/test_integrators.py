@@ -14,7 +14,7 @@ from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator, integrator_number
 from hovercraft_fmu.model.subcycling import Settings, advance, stability_number
 from hovercraft_fmu.scenes import COAST_SPEED, SCENES
-from hovercraft_fmu.trade.benchmark import reference_loop
+from hovercraft_fmu.studies.benchmark import reference_loop
 from tests.strategies import controls, crafts, numbers, states
 from tests.test_scenes import EXACT, NAMES
 

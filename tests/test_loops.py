@@ -37,7 +37,7 @@ from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import VOYAGES, Voyage
 from hovercraft_fmu.simulation import SimulationError
 from hovercraft_fmu.ssp import build_ssp
-from hovercraft_fmu.trade import coupling as study
+from hovercraft_fmu.studies import closed_loop as study
 from tests.conftest import ROOT
 
 RK4 = Settings(0.1, integrator(3))

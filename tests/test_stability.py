@@ -21,7 +21,7 @@ from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator_number
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, stability_number
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.trade.stability import (
+from hovercraft_fmu.studies.stability import (
     ACCURATE,
     FAILED,
     FIXED,

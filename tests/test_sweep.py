@@ -33,7 +33,8 @@ from hovercraft_fmu.model.dynamics import Controls
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator
 from hovercraft_fmu.model.subcycling import Settings, substeps
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.sweep import STUDIES, benchmark, load, read_study, sweep
+from hovercraft_fmu.studies import sweep_costs as benchmark
+from hovercraft_fmu.sweep import STUDIES, load, read_study, sweep
 from hovercraft_fmu.sweep import runner as runner_module
 from hovercraft_fmu.sweep.plots import plot_sweep
 from hovercraft_fmu.sweep.quantities import DERIVED, OBSERVED

@@ -31,11 +31,11 @@ from hovercraft_fmu.model.integrators import INTEGRATORS, integrator, integrator
 from hovercraft_fmu.model.subcycling import Settings, advance, substeps
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, schedule
-from hovercraft_fmu.trade.plain import plain_euler
-from hovercraft_fmu.trade.reference import reference_end
-from hovercraft_fmu.trade.rows import Setting
-from hovercraft_fmu.trade.scene_terms import TERMS
-from hovercraft_fmu.trade.work_precision import end_error
+from hovercraft_fmu.studies.plain import plain_euler
+from hovercraft_fmu.studies.reference_end import reference_end
+from hovercraft_fmu.studies.rows import Setting
+from hovercraft_fmu.studies.scene_terms import TERMS
+from hovercraft_fmu.studies.trade import end_error
 from tests.conftest import ROOT
 from tests.strategies import calm_controls, calm_crafts, controls, numbers, states
 from tests.test_trade import RESULTS, records

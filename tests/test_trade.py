@@ -14,10 +14,10 @@ from hovercraft_fmu.fmu.native_package import has_compiler
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.scenes import SCENES, Scene
 from hovercraft_fmu.simulation import schedule
-from hovercraft_fmu.trade import fleet_costs, model_exchange, native_costs
-from hovercraft_fmu.trade.reference import reference_end
-from hovercraft_fmu.trade.rows import Setting
-from hovercraft_fmu.trade.work_precision import (
+from hovercraft_fmu.studies import model_exchange, step_costs
+from hovercraft_fmu.studies.reference_end import reference_end
+from hovercraft_fmu.studies.rows import Setting
+from hovercraft_fmu.studies.trade import (
     ACCURACIES,
     holding_costs,
     observed_orders,
@@ -94,17 +94,13 @@ def test_the_command(tmp_path: Path) -> None:
     assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in advice)
     assert all(float(row["fmu_cost"]) > 0.0 < float(row["bare_cost"]) for row in rows)
     assert all((tmp_path / name).stat().st_size > 10000 for name in ("work_precision.png", "holding.png"))
-    if not native_costs.missing():
+    if not step_costs.missing():
         costs, before = (records(folder / "native.csv") for folder in (tmp_path, RESULTS))
         assert [row["what"] for row in costs] == [row["what"] for row in before]
         assert all(float(row["native"]) > 0.0 < float(row["other"]) for row in costs)
         assert {f"{method.name}: a sub-step" for method in INTEGRATORS} <= {row["what"] for row in costs}
         plain = [row["what"] for row in costs if row["compared_with"].startswith("plain C loop")]
         assert plain == ["semi_implicit_euler: a sub-step", "adaptive: a sub-step"]
-    if not fleet_costs.missing():
-        costs, before = (records(folder / "fleet.csv") for folder in (tmp_path, RESULTS))
-        assert [(row["step"], row["machine"]) for row in costs] == [(row["step"], row["machine"]) for row in before]
-        assert all(float(row["instances"]) > 0.0 < float(row["fleet"]) for row in costs)
     if has_compiler():
         chosen, runs, before = (
             records(folder / name)
@@ -151,8 +147,8 @@ def test_stretches_are_the_controls_of_the_scene(scene: Scene) -> None:
 def test_what_the_native_fmu_costs_is_said_where_it_cannot_be_measured(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(native_costs, "compiler", lambda: None)
+    monkeypatch.setattr(step_costs, "compiler", lambda: None)
     shown = Console(record=True)
-    shown.print(native_costs.run(tmp_path))
+    shown.print(step_costs.run(tmp_path))
     assert "not measured: no C compiler" in shown.export_text()
     assert list(tmp_path.iterdir()) == []

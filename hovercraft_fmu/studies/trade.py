@@ -27,7 +27,7 @@ from ..scenes import SCENES, Scene
 from ..simulation import Run, Value, instantiated, plan, read_description, schedule
 from ..view.tables import markdown
 from .pictures import draw_holding, draw_work_precision
-from .reference import reference_end
+from .reference_end import reference_end
 from .rows import Holding, Row, Setting
 
 STOP_TIME = 60.0

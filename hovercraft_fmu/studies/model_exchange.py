@@ -21,9 +21,9 @@ from ..fmu.native_package import build_native_fmu, has_compiler
 from ..model.dynamics import Controls, State
 from ..scenes import SCENES, Row, Scene
 from ..simulation import SimulationError, instantiated, plan, read_description
-from .reference import reference_end
+from .reference_end import reference_end
 from .rows import Setting
-from .work_precision import ADVISED_SCENE, REPEATS, STOP_TIME, settings
+from .trade import ADVISED_SCENE, REPEATS, STOP_TIME, settings
 
 COMMUNICATION_STEP = 0.5
 """s: how often inputs are set and outputs are read; where the inputs of a scene bend or jump, too."""

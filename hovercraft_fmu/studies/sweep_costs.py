@@ -20,10 +20,10 @@ from ..fmu.interface import STATES
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..simulation import plan
-from ..trade.work_precision import machine
+from ..sweep.runner import BATCH, FMU, Tell, sweep
+from ..sweep.study import read_study
 from ..view.tables import markdown
-from .runner import BATCH, FMU, Tell, sweep
-from .study import read_study
+from .trade import machine
 
 FMPY, PYTHON, NATIVE, BARE = "fmpy alone, native FMU", "sweep, Python FMU", "sweep, native FMU", "sweep, batch"
 END, EVERY = "end state", "every step"

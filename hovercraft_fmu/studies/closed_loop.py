@@ -17,8 +17,8 @@ from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..scenes import VOYAGES
 from ..view.plots import new_figure
-from .reference import TOLERANCES, scipy_module
-from .work_precision import machine
+from .reference_end import TOLERANCES, scipy_module
+from .trade import machine
 
 Tell = Callable[[float], None]
 VOYAGE = VOYAGES["crosswind"]

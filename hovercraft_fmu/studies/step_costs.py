@@ -28,7 +28,7 @@ CALLS = {0.01: 100, 0.1: 20, 1.0: 4}
 """Communication steps of one sample."""
 SAMPLES = 21
 OUTPUTS = [variable.reference for variable in VARIABLES if variable.causality == "output"]
-SOURCE = Path(__file__).parent / "native_costs.c"
+SOURCE = Path(__file__).parent / "step_costs.c"
 
 
 class Cost(NamedTuple):

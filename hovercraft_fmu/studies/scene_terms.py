@@ -23,7 +23,7 @@ from ..simulation import Value, plan, schedule
 from ..view.plots import new_figure
 from ..view.tables import markdown
 from .plain import PLAIN
-from .work_precision import machine
+from .trade import machine
 
 Tell = Callable[[float], None]
 """Called with the part of the work that is done, 0 to 1."""
