@@ -605,7 +605,7 @@ def run_model(run: Run) -> Result:
     for time, end, controls in schedule(run):
         stretch = advance(state, controls, craft, end - time, settings, proposed=proposed)
         state, proposed = stretch.state, stretch.proposed
-        stability = max(stability, stability_number(stretch.drag, stretch.rotation, craft))
+        stability = max(stability, stability_number(stretch.drag_mass, stretch.rotation, craft))
         rotation = max(rotation, stretch.rotation)
         count = min(count + stretch.substeps, SUBSTEPS_MAX)
         rows.append(row(end))

@@ -73,7 +73,7 @@ class CStretch(Structure):
     _fields_ = [
         ("state", CState),
         ("substeps", c_int64),
-        ("drag", c_double),
+        ("drag_mass", c_double),
         ("rotation", c_double),
         ("proposed", c_double),
         ("substep", c_double),
@@ -117,7 +117,7 @@ class Kernel:
             byref(chosen), c_double(proposed), byref(made),
         )  # fmt: skip
         reached = State(*numbers_of(made.state, State._fields))
-        return OUTCOMES[outcome], Stretch(reached, made.substeps, made.drag, made.rotation, made.proposed)
+        return OUTCOMES[outcome], Stretch(reached, made.substeps, made.drag_mass, made.rotation, made.proposed)
 
     def loads(self, state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
         arguments = byref(CState(*state)), byref(CControls(*controls)), byref(CCraft(*astuple(craft)))

@@ -175,4 +175,4 @@ def test_a_batch_is_each_craft_alone(method: Any, batch: list[tuple[Craft, State
         expected = advance(state, alone, craft, 0.01, way)
         assert [float(np.asarray(part)[i]) for part in end] == pytest.approx(expected.state, rel=1e-12, abs=1e-12)
         watched = [float(np.asarray(part)[i]) for part in (drag, rotation)]
-        assert watched == pytest.approx([expected.drag, expected.rotation], rel=1e-12, abs=1e-12)
+        assert watched == pytest.approx([expected.drag_mass, expected.rotation], rel=1e-12, abs=1e-12)

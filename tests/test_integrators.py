@@ -160,8 +160,8 @@ def test_what_is_watched(each: Any) -> None:
     """Coasting slows down, so the largest number is that of the first sub-step; the spin is without drag."""
     craft = Craft(drag_center_fraction=0.0)
     stretch = advance(State(vx=1.0), NONE, craft, 0.5, Settings(0.05, each))
-    step = 0.05 if each.integrate else stretch.drag / craft.drag_factor  # of the adaptive method: some step's
-    assert stability_number(stretch.drag, stretch.rotation, craft) == pytest.approx(
+    step = 0.05 if each.integrate else stretch.drag_mass / craft.drag_factor  # of the adaptive method: some step's
+    assert stability_number(stretch.drag_mass, stretch.rotation, craft) == pytest.approx(
         step * 2.0 * craft.drag_factor / craft.mass
     )
     spin = advance(State(yaw_rate=-3.0), NONE, Craft(drag_coefficient=0.0), 0.5, Settings(0.05, each))

@@ -29,7 +29,7 @@ class Stretch(NamedTuple):
 
     state: State
     substeps: int
-    drag: float
+    drag_mass: float
     """kg: the largest h*k*q, wherever the loads were worked out and at the end"""
     rotation: float
     """rad: the largest |yaw rate|*h, there too"""
@@ -169,7 +169,7 @@ def _rk4_with_friction(state: State, controls: Controls, craft: Craft, h: float,
     radius = friction_radius(craft, ns)
     larger = max if ns is math else ns.fmax
     near = NEAR_REST * larger(*friction_gains(craft, h, ns))
-    drag = rotation = 0.0
+    drag_mass = rotation = 0.0
     for _ in range(n):
         at_rest = slip_speed(state.vx, state.vy, radius * state.yaw_rate, ns) < near
         if ns is not math:
@@ -183,15 +183,16 @@ def _rk4_with_friction(state: State, controls: Controls, craft: Craft, h: float,
             stretch = semi_implicit_euler(state, controls, craft, h, 1)
         else:
             stretch = _rk4(sliding, state, craft, h, 1, ns)
-        state, drag, rotation = stretch.state, larger(drag, stretch.drag), larger(rotation, stretch.rotation)
-    return Stretch(state, n, drag, rotation)
+        state, drag_mass = stretch.state, larger(drag_mass, stretch.drag_mass)
+        rotation = larger(rotation, stretch.rotation)
+    return Stretch(state, n, drag_mass, rotation)
 
 
 def _either(condition: bool, this: Stretch, other: Stretch, ns: Namespace) -> Stretch:
     """For arrays of craft: of each the one stretch or the other."""
     state = State(*(ns.where(condition, a, b) for a, b in zip(this.state, other.state, strict=True)))
-    drag, rotation = ns.where(condition, this.drag, other.drag), ns.where(condition, this.rotation, other.rotation)
-    return Stretch(state, this.substeps, drag, rotation)
+    drag_mass = ns.where(condition, this.drag_mass, other.drag_mass)
+    return Stretch(state, this.substeps, drag_mass, ns.where(condition, this.rotation, other.rotation))
 
 
 def _rk4(loads_at: LoadFunction, state: State, craft: Craft, h: float, n: int, ns: Namespace) -> Stretch:

@@ -466,8 +466,8 @@ def carry_out(runs: Runs, method: Integrator) -> Outcome:
         for _ in range(runs.substeps):
             stretch = step(state, runs.controls, craft, h, 1, np)
             state = stretch.state
-            sigma = np.fmax(sigma, stability_number(stretch.drag, stretch.rotation, craft))
-            drag, rho = np.fmax(drag, stretch.drag), np.fmax(rho, stretch.rotation)
+            sigma = np.fmax(sigma, stability_number(stretch.drag_mass, stretch.rotation, craft))
+            drag, rho = np.fmax(drag, stretch.drag_mass), np.fmax(rho, stretch.rotation)
             speed = np.fmax(speed, _size(state.vx, state.vy, state.yaw_rate, craft))
             finite &= np.isfinite(np.sum(state, axis=0))
         alpha, phi = _per(_gain(runs), speed), _per(_grip(runs), speed)

@@ -122,7 +122,7 @@ class _Batch:
     def _advance(self, leg: Leg, controls: Controls) -> None:
         stretch = advance(self._state, controls, self._craft, leg.end - leg.time, self._settings, ns=np)
         self._state = stretch.state
-        number = stability_number(stretch.drag, stretch.rotation, self._craft)
+        number = stability_number(stretch.drag_mass, stretch.rotation, self._craft)
         # not fmax: what is not a number stays so
         self._stability = np.maximum(self._stability, number)
         self._rotation = np.maximum(self._rotation, stretch.rotation)

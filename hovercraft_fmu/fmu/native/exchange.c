@@ -75,7 +75,7 @@ enum verdict instance_set_states(struct instance *instance, const char *call, co
             return instance_say(instance, REFUSED, "%s = %r: must be a finite number", VARIABLES[STATES[i]].name,
                                 values[i]);
     now->state = (struct state){values[0], values[1], values[2], values[3], values[4], values[5]};
-    now->moved = now->acted = true;
+    now->motion_unread = now->action_unread = true;
     return FINE;
 }
 

@@ -85,7 +85,7 @@ bool instance_has_started(const struct content *content)
 void instance_reset(struct instance *instance)
 {
     const struct content empty = {
-        .use = instance->now.use, .phase = INSTANTIATED, .stop_time = INFINITY, .moved = true, .acted = true};
+        .use = instance->now.use, .phase = INSTANTIATED, .stop_time = INFINITY, .motion_unread = true, .action_unread = true};
     instance->now = empty;
     instance->last_step = FINE;
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
@@ -198,7 +198,7 @@ static enum verdict take_up_start_values(struct instance *instance)
     get_state(now->reals, &now->state);
     now->reals[V_PROJECTED_AREA] = kernel_derived(&craft).projected_area;
     now->tuned = false;
-    now->moved = now->acted = true;
+    now->motion_unread = now->action_unread = true;
     return FINE;
 }
 
@@ -400,7 +400,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
         kernel_advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
     if (outcome != ADVANCED)
         return refuse_step(instance, outcome, step, &stretch);
-    const double stability = kernel_stability_number(stretch.drag, stretch.rotation, &craft);
+    const double stability = kernel_stability_number(stretch.drag_mass, stretch.rotation, &craft);
     if (check_watched(instance, stability, stretch.rotation) == REFUSED)
         return REFUSED;
     now->state = stretch.state;
@@ -409,7 +409,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->craft = craft;
     now->tuned = false;
     now->time = point + step;
-    now->moved = now->acted = true;
+    now->motion_unread = now->action_unread = true;
     now->stability = larger(now->stability, stability);
     now->rotation = larger(now->rotation, stretch.rotation);
     now->reals[V_THRUST] = end.thrust; /* a ramp goes on from here */
@@ -460,7 +460,7 @@ static enum verdict observe_motion(struct instance *instance)
 {
     struct content *now = &instance->now;
     double *reals = now->reals;
-    if (!now->moved)
+    if (!now->motion_unread)
         return FINE;
     if ((instance_has_started(now) ? instance_take_up(instance) : take_up_start_values(instance)) == REFUSED)
         return REFUSED;
@@ -475,7 +475,7 @@ static enum verdict observe_motion(struct instance *instance)
     reals[V_VELOCITY_X] = s->vx;
     reals[V_VELOCITY_Y] = s->vy;
     reals[V_VELOCITY_YAW_RATE] = s->yaw_rate;
-    now->moved = false;
+    now->motion_unread = false;
     return FINE;
 }
 
@@ -484,7 +484,7 @@ static enum verdict observe_action(struct instance *instance)
 {
     struct content *now = &instance->now;
     double *reals = now->reals;
-    if (!now->acted)
+    if (!now->action_unread)
         return FINE;
     const struct loads loads = kernel_loads_on(&now->state, &now->controls, &now->craft);
     reals[V_FORCE_X] = loads.x;
@@ -499,7 +499,7 @@ static enum verdict observe_action(struct instance *instance)
     reals[V_ROTATION_PER_SUBSTEP] = now->rotation;
     if (check_finite(instance, ACTION, sizeof ACTION / sizeof *ACTION) == REFUSED)
         return REFUSED;
-    now->acted = false;
+    now->action_unread = false;
     return FINE;
 }
 
@@ -532,7 +532,7 @@ enum verdict instance_get_reals(struct instance *instance, const unsigned *refer
     for (size_t i = 0; i < n; i++) {
         if (!is_real(references[i]))
             return instance_no_such(instance, "Real", references[i]);
-        if (instance->now.acted && is_action(references[i]) && observe_action(instance) == REFUSED)
+        if (instance->now.action_unread && is_action(references[i]) && observe_action(instance) == REFUSED)
             return REFUSED;
     }
     for (size_t i = 0; i < n; i++)
@@ -611,7 +611,7 @@ static void after_set(struct instance *instance, bool parameter)
 {
     instance->now.tuned = instance->now.tuned || parameter;
     if (instance->now.phase != STEPPING)
-        instance->now.moved = instance->now.acted = true;
+        instance->now.motion_unread = instance->now.action_unread = true;
 }
 
 /* Which input a reference is, or INPUT_COUNT. */

@@ -39,8 +39,8 @@ struct content {
     double proposed;                  /* s, the next step of the adaptive method */
     double stability, rotation;       /* 1, rad: the largest of a sub-step so far */
     bool tuned;                       /* a parameter was set since the last step: the next one takes it up */
-    bool moved;                       /* the motion in `reals` is not yet that of the communication point */
-    bool acted;                       /* nor is what acts on the craft */
+    bool motion_unread;                       /* the motion in `reals` is not yet that of the communication point */
+    bool action_unread;                       /* nor is what acts on the craft */
 };
 
 struct instance {

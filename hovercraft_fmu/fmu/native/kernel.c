@@ -144,11 +144,11 @@ static double clip(double value, double low, double high)
 struct controls kernel_saturate(const struct controls *controls, const struct craft *craft)
 {
     return (struct controls){
-        clip(controls->thrust, craft->thrust_min, craft->thrust_max),
-        clip(controls->port, 0.0, 1.0),
-        clip(controls->starboard, 0.0, 1.0),
-        controls->wind_x,
-        controls->wind_y,
+        .thrust = clip(controls->thrust, craft->thrust_min, craft->thrust_max),
+        .port = clip(controls->port, 0.0, 1.0),
+        .starboard = clip(controls->starboard, 0.0, 1.0),
+        .wind_x = controls->wind_x,
+        .wind_y = controls->wind_y,
     };
 }
 
@@ -163,11 +163,11 @@ struct controls kernel_controls_at(const struct drive *drive, double time)
     if (!drive->ramped)
         return drive->start;
     return (struct controls){
-        drive->start.thrust + time * drive->rate.thrust,
-        drive->start.port + time * drive->rate.port,
-        drive->start.starboard + time * drive->rate.starboard,
-        drive->start.wind_x + time * drive->rate.wind_x,
-        drive->start.wind_y + time * drive->rate.wind_y,
+        .thrust = drive->start.thrust + time * drive->rate.thrust,
+        .port = drive->start.port + time * drive->rate.port,
+        .starboard = drive->start.starboard + time * drive->rate.starboard,
+        .wind_x = drive->start.wind_x + time * drive->rate.wind_x,
+        .wind_y = drive->start.wind_y + time * drive->rate.wind_y,
     };
 }
 
@@ -409,7 +409,13 @@ static struct stretch stretch_of(struct load_function *f, const struct state *s,
                                  const struct watch *watch)
 {
     const double most = larger(watch->most, loads_at(f, s->heading, s->vx, s->vy, s->yaw_rate).kq);
-    return (struct stretch){*s, n, h * most, h * larger(watch->right, -watch->left), 0.0, h};
+    return (struct stretch){
+        .state = *s,
+        .substeps = n,
+        .drag_mass = h * most,
+        .rotation = h * larger(watch->right, -watch->left),
+        .substep = h,
+    };
 }
 
 static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, const struct state *state, struct load_function *f,
@@ -549,14 +555,14 @@ static struct stretch rk4_with_friction(const struct state *state, struct load_f
     struct load_function sliding = sliding_load_function(f->drive, f->craft);
     const struct friction friction = friction_function(f->craft, h);
     const double near = NEAR_REST * larger(friction.a, friction.b);
-    struct stretch whole = {*state, n, 0.0, 0.0, 0.0, h};
+    struct stretch whole = {.state = *state, .substeps = n, .substep = h};
     for (int64_t i = 0; i < n; i++) {
         const struct state *s = &whole.state;
         const bool at_rest = slip_speed(s->vx, s->vy, friction.radius * s->yaw_rate) < near;
         f->begun = sliding.begun = (double)i * h;
         const struct stretch one = at_rest ? semi_implicit_euler(s, f, h, 1) : smooth_rk4(s, &sliding, h, 1);
         whole.state = one.state;
-        whole.drag = larger(whole.drag, one.drag);
+        whole.drag_mass = larger(whole.drag_mass, one.drag_mass);
         whole.rotation = larger(whole.rotation, one.rotation);
     }
     return whole;
@@ -567,7 +573,10 @@ static struct stretch rk4(const struct state *state, struct load_function *f, do
     return rubs(f->craft) ? rk4_with_friction(state, f, h, n) : smooth_rk4(state, f, h, n);
 }
 
-enum { STAGES = 7, COMPONENTS = 6 };
+enum { STAGES = 7 };
+/* Of the state, in its order. */
+enum { X, Y, HEADING, VX, VY, YAW_RATE, COMPONENTS };
+_Static_assert(sizeof(struct state) == COMPONENTS * sizeof(double), "a component for each part of the state");
 /* Dormand, Prince (1980): the pair 5(4); row i leads to stage i + 1. */
 static const double WEIGHTS[STAGES - 1][STAGES - 1] = {
     {1.0 / 5},
@@ -583,7 +592,23 @@ static const double NODES[STAGES - 1] = {1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1.
 static const double ERROR[STAGES] = {71.0 / 57600,      0.0,         -71.0 / 16695, 71.0 / 1920,
                                      -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
 
-/* The derivative of the state, in its order, and k*q there. */
+static void components_of(const struct state *s, double y[COMPONENTS])
+{
+    y[X] = s->x;
+    y[Y] = s->y;
+    y[HEADING] = s->heading;
+    y[VX] = s->vx;
+    y[VY] = s->vy;
+    y[YAW_RATE] = s->yaw_rate;
+}
+
+static struct state state_of(const double y[COMPONENTS])
+{
+    return (struct state){
+        .x = y[X], .y = y[Y], .heading = y[HEADING], .vx = y[VX], .vy = y[VY], .yaw_rate = y[YAW_RATE]};
+}
+
+/* The derivative of the state, and k*q there. */
 struct rates {
     double of[COMPONENTS];
     double kq;
@@ -591,8 +616,11 @@ struct rates {
 
 static struct rates rates_at(struct load_function *f, const double y[COMPONENTS])
 {
-    const struct loads a = accelerations_as(f, f->kind, f->slides, y[2], y[3], y[4], y[5]);
-    return (struct rates){{y[3], y[4], y[5], a.x, a.y, a.moment}, a.kq};
+    const struct loads a = accelerations_as(f, f->kind, f->slides, y[HEADING], y[VX], y[VY], y[YAW_RATE]);
+    return (struct rates){
+        .of = {[X] = y[VX], [Y] = y[VY], [HEADING] = y[YAW_RATE], [VX] = a.x, [VY] = a.y, [YAW_RATE] = a.moment},
+        .kq = a.kq,
+    };
 }
 
 static double combined(const double *weights, int n, const struct rates *stages, int i)
@@ -629,10 +657,11 @@ static bool can_slide(const struct load_function *f, const double y[COMPONENTS],
     *longest = INFINITY;
     if (!friction->rubs)
         return true;
-    const double turning = f->radius * y[5], speed = slip_speed(y[3], y[4], turning);
+    const double turning = f->radius * y[YAW_RATE], speed = slip_speed(y[VX], y[VY], turning);
     if (!(speed > tolerance))
         return false;
-    const double gain = (y[3] * rates->of[3] + y[4] * rates->of[4] + f->radius * turning * rates->of[5]) / speed;
+    const double gain =
+        (y[VX] * rates->of[VX] + y[VY] * rates->of[VY] + f->radius * turning * rates->of[YAW_RATE]) / speed;
     *longest = speed / larger(larger(friction->a, friction->b), NEAR_REST * -gain);
     return *longest > MIN_STEP;
 }
@@ -641,15 +670,12 @@ static bool can_slide(const struct load_function *f, const double y[COMPONENTS],
 static double near_rest(struct load_function *free, struct load_function *f, double time, const double y[COMPONENTS],
                         double h, struct rates *rates, double new[COMPONENTS])
 {
-    const struct state before = {y[0], y[1], y[2], y[3], y[4], y[5]};
+    const struct state before = state_of(y);
     free->begun = time;
     const struct state after = semi_implicit_euler(&before, free, h, 1).state;
-    const double values[COMPONENTS] = {after.x, after.y, after.heading, after.vx, after.vy, after.yaw_rate};
-    double change = fabs(values[3] - y[3]);
-    for (int i = 0; i < COMPONENTS; i++)
-        new[i] = values[i];
-    for (int i = 4; i < COMPONENTS; i++)
-        change = larger(change, fabs(values[i] - y[i]));
+    const double change = larger(larger(fabs(after.vx - y[VX]), fabs(after.vy - y[VY])),
+                                 fabs(after.yaw_rate - y[YAW_RATE]));
+    components_of(&after, new);
     steer_at(f, time + h);
     *rates = rates_at(f, new);
     const double error = change * larger(1.0, h);
@@ -662,10 +688,11 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
     struct load_function free = load_function(drive, craft);
     struct load_function f = rubs(craft) ? sliding_load_function(drive, craft) : free;
     const struct friction friction = friction_function(craft, 1.0);
-    double y[COMPONENTS] = {state->x, state->y, state->heading, state->vx, state->vy, state->yaw_rate};
+    double y[COMPONENTS];
     double time = 0.0, most = 0.0, fastest = 0.0;
     int64_t count = 0;
     struct rates stages[STAGES];
+    components_of(state, y);
     stages[0] = rates_at(&f, y);
     while (time < duration) {
         double new[COMPONENTS], longest, h = smaller(duration - time, proposed);
@@ -684,18 +711,24 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
             continue;
         }
         most = larger(most, h * stages[0].kq);
-        fastest = larger(fastest, h * fabs(y[5]));
+        fastest = larger(fastest, h * fabs(y[YAW_RATE]));
         time = last ? duration : time + h;
         for (int i = 0; i < COMPONENTS; i++)
             y[i] = new[i];
         stages[0] = stages[STAGES - 1];
         count++;
         most = larger(most, h * stages[0].kq);
-        fastest = larger(fastest, h * fabs(y[5]));
+        fastest = larger(fastest, h * fabs(y[YAW_RATE]));
         if (!last) /* a step cut short by the end says nothing against the one proposed */
             proposed = h * smaller(5.0, error > 0.0 ? 0.9 * sqrt(sqrt(tolerance / error)) : 5.0);
     }
-    *stretch = (struct stretch){{y[0], y[1], y[2], y[3], y[4], y[5]}, count, most, fastest, proposed, 0.0};
+    *stretch = (struct stretch){
+        .state = state_of(y),
+        .substeps = count,
+        .drag_mass = most,
+        .rotation = fastest,
+        .proposed = proposed,
+    };
     return ADVANCED;
 }
 

@@ -75,7 +75,7 @@ struct settings {
 struct stretch {
     struct state state;
     int64_t substeps;
-    double drag;     /* kg: the largest h*k*q, wherever the loads were worked out and at the end */
+    double drag_mass; /* kg: the largest h*k*q, wherever the loads were worked out and at the end */
     double rotation; /* rad: the largest |yaw rate|*h, there too */
     double proposed; /* s: the step that the adaptive method would take next */
     double substep;  /* s: the sub-step that was taken, or the one that is too small */

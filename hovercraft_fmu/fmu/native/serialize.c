@@ -208,7 +208,7 @@ enum verdict instance_deserialize(struct instance *instance, const unsigned char
     *content = instance->now; /* what is not among the bytes is worked out again */
     exchange(&cursor, content);
     content->reals[V_PROJECTED_AREA] = kernel_derived(&content->craft).projected_area;
-    content->moved = content->acted = true;
+    content->motion_unread = content->action_unread = true;
     if (!is_possible(content))
         return instance_say(instance, REFUSED, "serialized FMU state of %u bytes: must be one that this FMU wrote",
                             (unsigned long long)size);

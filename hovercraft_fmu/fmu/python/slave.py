@@ -78,7 +78,7 @@ class HovercraftSlave(Slave):
             stretch = advance(self._state, controls, craft, step_size, self._settings, proposed=self._proposed)
         except NonFiniteError as error:
             self._refuse_motion(error)
-        stability, rotation = stability_number(stretch.drag, stretch.rotation, craft), stretch.rotation
+        stability, rotation = stability_number(stretch.drag_mass, stretch.rotation, craft), stretch.rotation
         if not stability < math.inf:
             self._refuse_watched(stability, rotation)
         self._state, n, _, _, self._proposed = stretch
