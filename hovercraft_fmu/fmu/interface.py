@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 from types import MappingProxyType
 from typing import Literal, TypeAlias
@@ -17,7 +18,11 @@ Variability: TypeAlias = Literal["continuous", "discrete", "fixed", "tunable"]
 
 SUBSTEPS_MAX = 2147483647
 """The largest FMI Integer: the counter of sub-steps stops there."""
-
+SAME_TIME = 1e-9
+"""Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step, or past
+the stop time."""
+HELD = 1e-9
+"""Relative to the limit (at least 1): an input beyond it by less is a rounding of the host's interpolation."""
 
 INPUT_HELD, COUNTER_STOPPED, STEP_UNSTABLE, STEP_TURNS = 1, 2, 4, 8
 WARNINGS: Mapping[int, str] = MappingProxyType(
@@ -118,6 +123,22 @@ class Variable:
         if self.causality in ("input", "independent"):
             return None
         return "calculated" if self.start is None else "exact"
+
+
+class Phase(Enum):
+    """Where the instance is in FMI's life cycle, in the words of the standard."""
+
+    INSTANTIATED = "instantiated"
+    INITIALIZING = "initialization mode"
+    STEPPING = "step mode"
+    TERMINATED = "terminated"
+
+
+def may_be_set(variable: Variable, phase: Phase) -> bool:
+    """Whether a host may set it there: start values before the first step, then inputs and what is tunable."""
+    if phase is Phase.STEPPING:
+        return variable.causality == "input" or variable.variability == "tunable"
+    return phase is not Phase.TERMINATED and variable.start is not None
 
 
 @dataclass(frozen=True)

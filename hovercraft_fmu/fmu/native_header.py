@@ -15,9 +15,11 @@ from .interface import (
     CRAFT_PARAMETERS,
     DERIVATIVES,
     ENUMERATIONS,
+    HELD,
     INPUT_HELD,
     INPUTS,
     MOTION,
+    SAME_TIME,
     STATES,
     STEP_TURNS,
     STEP_UNSTABLE,
@@ -27,10 +29,10 @@ from .interface import (
     WARNINGS,
     WATCHED,
     Enumeration,
+    Phase,
     Variable,
+    may_be_set,
 )
-from .python.life_cycle import SAME_TIME, Phase, may_be_set
-from .python.slave import HELD
 
 HEADER = """\
 /* Made from hovercraft_fmu/fmu/interface.py. */

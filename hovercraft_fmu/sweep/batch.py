@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..fmu.interface import (
     ACTION,
     CRAFT_PARAMETERS,
+    HELD,
     INPUT_HELD,
     INPUTS,
     MOTION,
@@ -19,7 +20,6 @@ from ..fmu.interface import (
     observe_action,
     observe_motion,
 )
-from ..fmu.python.slave import HELD
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State, saturate
 from ..model.subcycling import Settings, advance, stability_number

@@ -4,38 +4,18 @@ import hashlib
 import json
 import math
 from collections.abc import MutableMapping
-from enum import Enum
 from typing import Any, ClassVar, TypeVar
 from xml.etree.ElementTree import Element
 
 from ...model.subcycling import check_tolerance
 from ..description import Flavour, model_description
-from ..interface import Variable
+from ..interface import SAME_TIME, Phase, Variable, may_be_set
 from .wrapper import WrappedSlave, called_by_wrapper
 
-SAME_TIME = 1e-9
-"""Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step, or past
-the stop time."""
 DIGEST_SIZE = 64
 """Bytes of the hexadecimal SHA-256 ahead of a serialized state."""
 WHOLE_NUMBER = "Integer or Enumeration"
 Number = TypeVar("Number", float, int, bool)
-
-
-class Phase(Enum):
-    """Where the instance is in FMI's life cycle, in the words of the standard."""
-
-    INSTANTIATED = "instantiated"
-    INITIALIZING = "initialization mode"
-    STEPPING = "step mode"
-    TERMINATED = "terminated"
-
-
-def may_be_set(variable: Variable, phase: Phase) -> bool:
-    """Whether a host may set it there: start values before the first step, then inputs and what is tunable."""
-    if phase is Phase.STEPPING:
-        return variable.causality == "input" or variable.variability == "tunable"
-    return phase is not Phase.TERMINATED and variable.start is not None
 
 
 class Slave(WrappedSlave):

@@ -20,6 +20,7 @@ from ..interface import (
     BY_NAME,
     COUNTER_STOPPED,
     CRAFT_PARAMETERS,
+    HELD,
     INPUT_HELD,
     INPUTS,
     MOTION,
@@ -36,8 +37,6 @@ from ..interface import (
 from .life_cycle import Slave, refuse_non_finite
 from .wrapper import Fmi2Status
 
-HELD = 1e-9
-"""Relative to the limit (at least 1): an input beyond it by less is a rounding of the host's interpolation."""
 THRUST, PORT, STARBOARD, WIND_X, WIND_Y = (BY_NAME[name].reference for name in INPUTS)
 STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
 MOTION_REFERENCES = STATE_REFERENCES + tuple(BY_NAME[name].reference for name in MOTION)
