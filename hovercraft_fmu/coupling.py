@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from .autopilot.guidance import Commands, Gains, Pilot, Sight, Waypoint, steer
 from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
 from .autopilot.pilot_package import build_autopilot
-from .fmu.description import HOVERCRAFT
-from .fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES, Model
+from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
+from .fmu.variable import Model
 from .model.craft import Craft
 from .model.dynamics import Controls, State
 from .model.subcycling import Settings, advance

@@ -20,24 +20,13 @@ import numpy as np
 from fmpy import fmi2, fmi3
 from numpy.typing import NDArray
 
-from .fmu.description import COMMUNICATION_STEP, MODEL_NAME, STOP_TIME
-from .fmu.interface import (
-    ACTION,
-    BY_NAME,
-    CRAFT_PARAMETERS,
-    INPUTS,
-    MOTION,
-    STATES,
-    SUBSTEPS_MAX,
-    WATCHED,
-    Enumeration,
-    observe_action,
-    observe_motion,
-)
+from .fmu.interface import ACTION, BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, MOTION, STATES, SUBSTEPS_MAX, WATCHED
 from .fmu.python_package import build_fmu
+from .fmu.variable import Enumeration
 from .model.craft import Craft, preset
 from .model.dynamics import Controls, State
 from .model.integrators import integrator
+from .model.observation import observe_action, observe_motion
 from .model.subcycling import Settings, advance, stability_number
 from .scenes import Scene, Signals, scene, signals
 
@@ -50,7 +39,7 @@ Progress: TypeAlias = Callable[[float], None]
 
 VERSIONS = ("2.0", "3.0")
 """Of FMI, that are run here."""
-DEFAULT_FMU = Path("build") / f"{MODEL_NAME}.fmu"
+DEFAULT_FMU = Path("build") / f"{HOVERCRAFT.name}.fmu"
 
 
 class SimulationError(RuntimeError):
@@ -201,8 +190,8 @@ def plan(
     values = _scene_values(chosen, preset) | _start_values(start_values or {})
     first, last = float(table["time"][0]), float(table["time"][-1])
     if len(table) == 1:
-        last = first + STOP_TIME
-    default_step = chosen.communication_step if chosen else COMMUNICATION_STEP
+        last = first + HOVERCRAFT.stop_time
+    default_step = chosen.communication_step if chosen else HOVERCRAFT.communication_step
     run = Run(
         title=_title(chosen, scene_or_inputs),
         signals=_completed(table, values),
@@ -455,7 +444,7 @@ def stepping(run: Run, fmu: str | os.PathLike[str]) -> Iterator[Stepper]:
 
 @contextmanager
 def loaded(
-    fmu: str | os.PathLike[str], messages: list[str], model: str = MODEL_NAME, versions: Sequence[str] = VERSIONS
+    fmu: str | os.PathLike[str], messages: list[str], model: str = HOVERCRAFT.name, versions: Sequence[str] = VERSIONS
 ) -> Iterator[tuple[str, Any, Any]]:
     """The folder an FMU is extracted to, an instance in it, its description.
 
@@ -464,7 +453,7 @@ def loaded(
     """
     path = Path(fmu)
     if not path.is_file():
-        command = "build" if model == MODEL_NAME else "build --ssp"
+        command = "build" if model == HOVERCRAFT.name else "build --ssp"
         raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu {command}' writes build/{model}.fmu")
     description = read_description(path, model=model, versions=versions)
     with instantiated(path, description, messages) as (folder, instance):

@@ -7,10 +7,11 @@ from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 from ._version import RELEASE_DATE, __version__
 from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
-from .fmu.description import AUTHOR, HOVERCRAFT
+from .fmu.description import AUTHOR
 from .fmu.extras import xml
-from .fmu.interface import STATES, Variable
+from .fmu.interface import HOVERCRAFT, STATES
 from .fmu.python_package import write_archive, zipped
+from .fmu.variable import Variable
 from .scenes import VOYAGES, Voyage
 
 CRAFT, PILOT = "hovercraft", "autopilot"

@@ -15,7 +15,7 @@ import numpy as np
 from lxml import etree
 
 from . import hosts
-from .fmu.description import MODEL_NAME
+from .fmu.interface import HOVERCRAFT
 from .simulation import SimulationError, instantiated, read_description
 
 STEPS = 5
@@ -68,7 +68,7 @@ def validate_elsewhere(path: str | os.PathLike[str]) -> Iterator[Check]:
         ValueError: not an FMU of the hovercraft, whose variables the hosts drive.
     """
     path = Path(path)
-    read_description(path, validate=False, model=MODEL_NAME)
+    read_description(path, validate=False, model=HOVERCRAFT.name)
     others = hosts.hosts_of(path)
     toolbox = hosts.HOSTS["fmucontainer"]
     what, missing = "fmutool -check: schema and semantics", toolbox.missing()

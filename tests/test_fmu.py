@@ -141,7 +141,7 @@ import shutil, sys, tempfile
 from pathlib import Path
 import fmpy
 import hovercraft_fmu
-from hovercraft_fmu.fmu import package
+from hovercraft_fmu.fmu import python_package as package
 from hovercraft_fmu.simulation import plan, run_model
 
 changed = Path("changed")

@@ -11,10 +11,10 @@ from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu import document
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from hovercraft_fmu.fmu.document import pages
-from hovercraft_fmu.fmu.interface import observe_motion
 from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, HOSTS, hosts_of, run_in
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
+from hovercraft_fmu.model.observation import observe_motion
 from hovercraft_fmu.model.subcycling import advance
 from tests.conftest import ROOT
 

@@ -9,8 +9,7 @@ import fmpy
 import pytest
 from lxml import etree
 
-from hovercraft_fmu.fmu.description import HOVERCRAFT
-from hovercraft_fmu.fmu.interface import ACTION, INPUTS, MOTION, STATES, VARIABLES, WATCHED
+from hovercraft_fmu.fmu.interface import ACTION, HOVERCRAFT, INPUTS, MOTION, STATES, VARIABLES, WATCHED
 from hovercraft_fmu.model.integrators import INTEGRATORS
 
 # name: (causality, variability, initial, unit, start)

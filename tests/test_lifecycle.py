@@ -24,11 +24,10 @@ from hovercraft_fmu.fmu.interface import (
     STEP_TURNS,
     STEP_UNSTABLE,
     SUBSTEPS_MAX,
-    observe_action,
-    observe_motion,
 )
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
+from hovercraft_fmu.model.observation import observe_action, observe_motion
 from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
 from tests.blobs import with_build, with_substeps

@@ -3,7 +3,8 @@
 from dataclasses import fields
 
 from ..fmu.description import PYTHON
-from ..fmu.interface import BY_NAME, STATES, Model, Variable
+from ..fmu.interface import BY_NAME, STATES
+from ..fmu.variable import Model, Variable
 from .guidance import UNITS_OF_GAINS, Gains
 
 WAYPOINTS_MAX = 8

@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from ..fmu.interface import STATES, Variable
+from ..fmu.interface import STATES
 from ..fmu.python.life_cycle import Slave, refuse_non_finite
+from ..fmu.variable import Variable
 from ..model.dynamics import State
 from .guidance import Commands, Gains, Pilot, Sight, Waypoint, check_gain, steer
 from .pilot_interface import AUTOPILOT, AUTOPILOT_MODEL, COMMANDS, GAINS, WAYPOINTS_MAX, waypoint_names

@@ -7,18 +7,13 @@ from typing import Literal
 from xml.etree.ElementTree import Element, SubElement
 
 from .._version import RELEASE_DATE, __version__
-from .interface import CRAFT_PARAMETERS, DERIVATIVES, INPUTS, STATES, TIME, VARIABLES, Kind, Model, Variable
+from .interface import CRAFT_PARAMETERS, DERIVATIVES, HOVERCRAFT, INPUTS, STATES, TIME
+from .variable import Kind, Model, Variable
 
-MODEL_NAME = "Hovercraft"
-DESCRIPTION = (
-    "Hovercraft that moves in the plane: a rigid body with one propeller, two bow thrusters, and air drag that acts "
-    "behind the centre of gravity"
-)
 AUTHOR = "The hovercraft-fmu authors"
 LICENSE = "MIT"
-START_TIME, STOP_TIME, COMMUNICATION_STEP = 0.0, 60.0, 0.01
-"""s: the default experiment. It names no tolerance: masters would pass it on to the FMU."""
-HOVERCRAFT = Model(MODEL_NAME, DESCRIPTION, VARIABLES, STOP_TIME, COMMUNICATION_STEP)
+START_TIME = 0.0
+"""s: of the default experiment. It names no tolerance: masters would pass it on to the FMU."""
 COMMON_CAPABILITIES = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canNotUseMemoryManagementFunctions": "true",
@@ -97,7 +92,7 @@ class Flavour:
 
 PYTHON = Flavour(
     model=HOVERCRAFT,
-    identifier=MODEL_NAME,
+    identifier=HOVERCRAFT.name,
     tool="PythonFMU",
     capabilities=MappingProxyType(CAPABILITIES),
     categories=MappingProxyType(
@@ -109,7 +104,7 @@ PYTHON = Flavour(
 )
 NATIVE = Flavour(
     model=HOVERCRAFT,
-    identifier=f"{MODEL_NAME}Native",
+    identifier=f"{HOVERCRAFT.name}Native",
     tool="zig cc",
     capabilities=MappingProxyType(
         {
@@ -125,7 +120,7 @@ NATIVE = Flavour(
 )
 NATIVE3 = Flavour(
     model=HOVERCRAFT,
-    identifier=f"{MODEL_NAME}Native3",
+    identifier=f"{HOVERCRAFT.name}Native3",
     tool="zig cc",
     capabilities=MappingProxyType(
         {

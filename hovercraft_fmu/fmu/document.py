@@ -11,8 +11,9 @@ import jinja2
 from .._version import __version__
 from ..model.craft import DRAG_AREAS, PRESETS
 from ..model.integrators import INTEGRATORS
-from .description import DESCRIPTION, FMI_3_TYPES, NATIVE, NATIVE3, PYTHON, Flavour
-from .interface import ACTION, MOTION, STATES, VARIABLES, WARNINGS, WATCHED, Variable
+from .description import FMI_3_TYPES, NATIVE, NATIVE3, PYTHON, Flavour
+from .interface import ACTION, MOTION, STATES, VARIABLES, WARNINGS, WATCHED
+from .variable import Variable
 
 FOLDER = Path(__file__).parent / "documentation"
 RESULTS = Path(__file__).parent.parent / "studies" / "results"
@@ -35,7 +36,7 @@ def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
         "flavour": flavour,
         "fmi": flavour.fmi,
         "types": FMI_3_TYPES if flavour.fmi == 3 else {},
-        "description": DESCRIPTION,
+        "description": flavour.model.description,
         "variables": VARIABLES,
         "warnings": WARNINGS,
         "integrators": INTEGRATORS,

@@ -19,7 +19,6 @@ from .interface import (
     INPUT_HELD,
     INPUTS,
     MOTION,
-    SAME_TIME,
     STATES,
     STEP_TURNS,
     STEP_UNSTABLE,
@@ -28,11 +27,8 @@ from .interface import (
     VARIABLES,
     WARNINGS,
     WATCHED,
-    Enumeration,
-    Phase,
-    Variable,
-    may_be_set,
 )
+from .variable import SAME_TIME, Enumeration, Phase, Variable, may_be_set
 
 HEADER = """\
 /* Made from hovercraft_fmu/fmu/interface.py. */

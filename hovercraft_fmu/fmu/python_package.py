@@ -26,6 +26,7 @@ SHARED = (
     "model/*.py",
     "fmu/__init__.py",
     "fmu/interface.py",
+    "fmu/variable.py",
     "fmu/description.py",
     "fmu/python/__init__.py",
     "fmu/python/life_cycle.py",

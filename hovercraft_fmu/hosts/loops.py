@@ -12,9 +12,9 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from ..autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
-from ..fmu.description import HOVERCRAFT
 from ..fmu.extras import xml
-from ..fmu.interface import STATES, Model
+from ..fmu.interface import HOVERCRAFT, STATES
+from ..fmu.variable import Model
 from ..scenes import VOYAGES
 from ..ssp import CRAFT, PARAMETERS, PILOT, build_ssp
 from . import HostError, load_tbb, make_container, run

@@ -17,11 +17,10 @@ from ..fmu.interface import (
     STEP_TURNS,
     STEP_UNSTABLE,
     WATCHED,
-    observe_action,
-    observe_motion,
 )
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State, saturate
+from ..model.observation import observe_action, observe_motion
 from ..model.subcycling import Settings, advance, stability_number
 from ..simulation import Run
 from .engines import SETTINGS, Plan, Ran, empty, settings_of

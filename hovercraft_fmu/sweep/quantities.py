@@ -8,7 +8,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fmu.interface import ACTION, BY_NAME, MOTION, STATES, UNITS, WATCHED
+from ..fmu.interface import ACTION, BY_NAME, MOTION, STATES, WATCHED
+from ..fmu.variable import UNITS
 
 Record: TypeAlias = NDArray[np.float64]
 """Shape (runs, points, quantities): what was read at the communication points that matter."""

@@ -24,7 +24,7 @@ from dask.system import CPU_COUNT
 from distributed.comm.addressing import get_address_host_port
 
 from .._version import __version__
-from ..fmu.description import MODEL_NAME
+from ..fmu.interface import HOVERCRAFT
 from ..model.integrators import INTEGRATORS
 from ..simulation import SimulationError, default_fmu, read_description
 from .batch import run_batch
@@ -213,7 +213,9 @@ def _content(study: Study, path: Path) -> bytes:
     """The FMU as it is now, checked."""
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes it")
-    has = {variable.name for variable in read_description(path, model=MODEL_NAME, versions=("2.0",)).modelVariables}
+    has = {
+        variable.name for variable in read_description(path, model=HOVERCRAFT.name, versions=("2.0",)).modelVariables
+    }
     for name in (*study.run.start_values, *(factor.name for factor in study.factors), *study.keep.read, *SETTINGS):
         if name not in has:
             raise ValueError(f"{path}: must have the variable {name}")

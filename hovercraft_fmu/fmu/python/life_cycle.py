@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 from ...model.subcycling import check_tolerance
 from ..description import Flavour, model_description
-from ..interface import SAME_TIME, Phase, Variable, may_be_set
+from ..variable import SAME_TIME, Phase, Variable, may_be_set
 from .wrapper import WrappedSlave, called_by_wrapper
 
 DIGEST_SIZE = 64

@@ -6,6 +6,7 @@ from typing import Any, NoReturn
 from ...model.craft import Craft, check_parameter
 from ...model.dynamics import Controls, State, saturate
 from ...model.integrators import integrator
+from ...model.observation import observe_action, observe_motion
 from ...model.subcycling import (
     NonFiniteError,
     Settings,
@@ -30,10 +31,8 @@ from ..interface import (
     SUBSTEPS_MAX,
     WARNINGS,
     WATCHED,
-    Variable,
-    observe_action,
-    observe_motion,
 )
+from ..variable import Variable
 from .life_cycle import Slave, refuse_non_finite
 from .wrapper import Fmi2Status
 

@@ -1,0 +1,164 @@
+"""What a table of variables is made of: units, enumerations, rows, when a row may be set; and what follows from it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+from types import MappingProxyType
+from typing import Literal, TypeAlias
+
+Kind: TypeAlias = Literal["Real", "Integer", "Enumeration", "Boolean"]
+Causality: TypeAlias = Literal["input", "output", "local", "parameter", "calculatedParameter", "independent"]
+Variability: TypeAlias = Literal["continuous", "discrete", "fixed", "tunable"]
+SAME_TIME = 1e-9
+"""Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step, or past
+the stop time."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as FMI wants it: exponents of the SI base units, and what displays show instead."""
+
+    type_name: str
+    quantity: str
+    base: Mapping[str, int]
+    display: tuple[str, float] | None = None
+    """Name and factor: display value = factor * value."""
+
+
+DEGREES_PER_RADIAN = 57.29577951308232
+
+UNITS: Mapping[str, Unit] = MappingProxyType(
+    {
+        "1": Unit("Ratio", "Dimensionless", {}),
+        "1/rad": Unit("PerAngle", "PerAngle", {"rad": -1}),
+        "kg": Unit("Mass", "Mass", {"kg": 1}),
+        "kg.m2": Unit("MomentOfInertia", "MomentOfInertia", {"kg": 1, "m": 2}),
+        "kg/m3": Unit("Density", "Density", {"kg": 1, "m": -3}),
+        "kg/s": Unit("MassFlowRate", "MassFlowRate", {"kg": 1, "s": -1}),
+        "m": Unit("Length", "Length", {"m": 1}),
+        "m/s": Unit("Velocity", "Velocity", {"m": 1, "s": -1}),
+        "m/s2": Unit("Acceleration", "Acceleration", {"m": 1, "s": -2}),
+        "m2": Unit("Area", "Area", {"m": 2}),
+        "N": Unit("Force", "Force", {"kg": 1, "m": 1, "s": -2}),
+        "N.m": Unit("Moment", "Torque", {"kg": 1, "m": 2, "s": -2}),
+        "rad": Unit("Angle", "Angle", {"rad": 1}, ("deg", DEGREES_PER_RADIAN)),
+        "rad/s": Unit("AngularVelocity", "AngularVelocity", {"rad": 1, "s": -1}, ("deg/s", DEGREES_PER_RADIAN)),
+        "rad/s2": Unit("AngularAcceleration", "AngularAcceleration", {"rad": 1, "s": -2}),
+        "s": Unit("Time", "Time", {"s": 1}),
+        "s/rad": Unit("TimePerAngle", "TimePerAngle", {"s": 1, "rad": -1}),
+    }
+)
+
+
+@dataclass(frozen=True)
+class Enumeration:
+    """An enumeration as FMI wants it; the items are numbered from 1."""
+
+    type_name: str
+    description: str
+    items: tuple[tuple[str, str], ...]
+    """Name, description."""
+
+    def number(self, name: str) -> int | None:
+        """The number of an item; None: there is none of that name."""
+        names = [item for item, _ in self.items]
+        return names.index(name) + 1 if name in names else None
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A row of the table. Names and value references stay as they are within a major version."""
+
+    reference: int
+    name: str
+    causality: Causality
+    variability: Variability
+    unit: str | None
+    start: float | int | None
+    description: str
+    kind: Kind = "Real"
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    derivative_of: str | None = None
+    depends_on: tuple[str, ...] = ()
+    """For a calculated output or parameter: the start values that its own start follows from."""
+    enumeration: Enumeration | None = None
+    """The choices of a variable of this kind."""
+
+    @property
+    def initial(self) -> str | None:
+        """FMI's `initial`: exact where a start is given, else calculated; none for an input and for the time."""
+        if self.causality in ("input", "independent"):
+            return None
+        return "calculated" if self.start is None else "exact"
+
+
+class Phase(Enum):
+    """Where the instance is in FMI's life cycle, in the words of the standard."""
+
+    INSTANTIATED = "instantiated"
+    INITIALIZING = "initialization mode"
+    STEPPING = "step mode"
+    TERMINATED = "terminated"
+
+
+def may_be_set(variable: Variable, phase: Phase) -> bool:
+    """Whether a host may set it there: start values before the first step, then inputs and what is tunable."""
+    if phase is Phase.STEPPING:
+        return variable.causality == "input" or variable.variability == "tunable"
+    return phase is not Phase.TERMINATED and variable.start is not None
+
+
+@dataclass(frozen=True)
+class Model:
+    """What an FMU is of: its table of variables, and what follows from that."""
+
+    name: str
+    description: str
+    variables: tuple[Variable, ...]
+    stop_time: float
+    """s, of the default experiment"""
+    communication_step: float
+    """s, of the default experiment"""
+
+    @cached_property
+    def by_reference(self) -> Mapping[int, Variable]:
+        """Value reference -> variable."""
+        return {variable.reference: variable for variable in self.variables}
+
+    @cached_property
+    def by_name(self) -> Mapping[str, Variable]:
+        """Name -> variable."""
+        return {variable.name: variable for variable in self.variables}
+
+    @cached_property
+    def index(self) -> Mapping[str, int]:
+        """Place in ModelVariables, counted from 1: what the model structure refers to."""
+        return {variable.name: i for i, variable in enumerate(self.variables, 1)}
+
+    @cached_property
+    def inputs(self) -> frozenset[int]:
+        """References of the inputs."""
+        return frozenset(v.reference for v in self.variables if v.causality == "input")
+
+    @cached_property
+    def kept(self) -> tuple[int, ...]:
+        """References of the Reals that are kept as the host set them: inputs and parameters."""
+        return tuple(
+            v.reference
+            for v in self.variables
+            if v.kind == "Real" and v.start is not None and v.causality in ("input", "parameter")
+        )
+
+    @cached_property
+    def units(self) -> Mapping[str, Unit]:
+        """Name -> unit, of those that its variables have."""
+        used = {variable.unit for variable in self.variables}
+        return {name: unit for name, unit in UNITS.items() if name in used}
+
+    @cached_property
+    def enumerations(self) -> tuple[Enumeration, ...]:
+        """Of its variables, each once."""
+        return tuple(dict.fromkeys(v.enumeration for v in self.variables if v.enumeration))
