@@ -17,9 +17,11 @@ from PIL import Image, ImageColor
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON
 from hovercraft_fmu.fmu.python_package import documents
 from hovercraft_fmu.simulation import Result, plan, run_model
-from hovercraft_fmu.view.animation import COLORS, FRAMES, MovingPicture, Track, animate
-from hovercraft_fmu.view.plots import PORT, STARBOARD
+from hovercraft_fmu.view.animation import FRAMES, MovingPicture, Track, animate
+from hovercraft_fmu.view.palette import METHODS
 from tests.conftest import ROOT
+
+COLORS = (METHODS["semi_implicit_euler"].color, METHODS["rk4"].color)
 
 
 def ran(scene: str = "ice", **start_values: Any) -> Result:
@@ -132,27 +134,6 @@ def test_what_cannot_be_animated(two: list[Result], tmp_path: Path) -> None:
         animate([*two, two[0]], tmp_path / "two.gif")
     with pytest.raises(ValueError, match=r"must have the same communication points"):
         animate([two[0], ran("launch")], tmp_path / "two.gif")
-
-
-# Brettel, Vienot and Mollon (1997) in the linear form of Vienot, Brettel and Mollon (1999): protanopia, deuteranopia
-BLIND = {
-    "protanopia": [[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]],
-    "deuteranopia": [[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]],
-}
-
-
-@pytest.mark.parametrize("kind", BLIND)
-def test_the_two_colors_can_be_told_apart_by_colour_blind_people(kind: str) -> None:
-    """By half of the range of a channel at least; the red and the green of port and starboard are not."""
-
-    def seen(color: str) -> np.ndarray[Any, Any]:
-        linear = (np.array(ImageColor.getrgb(color)) / 255.0) ** 2.2
-        return np.asarray(np.clip(np.array(BLIND[kind]) @ linear, 0.0, 1.0) ** (1.0 / 2.2))
-
-    def apart(a: str, b: str) -> float:
-        return float(np.abs(seen(a) - seen(b)).max())
-
-    assert apart(*COLORS) > 0.5 > apart(PORT, STARBOARD)
 
 
 def test_the_readmes_animation_is_small_and_stays_out_of_the_fmus(each_fmu: Path) -> None:

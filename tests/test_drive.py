@@ -23,7 +23,8 @@ from hovercraft_fmu.model.dynamics import State
 from hovercraft_fmu.simulation import SimulationError, Value, read_inputs, simulate
 from hovercraft_fmu.view.drive import drive, plan_drive
 from hovercraft_fmu.view.operator import TIME_SCALE
-from hovercraft_fmu.view.window import BAR, HULL, SIZE, VIEW_LENGTHS, WARNING
+from hovercraft_fmu.view.palette import HULL, WARNING
+from hovercraft_fmu.view.window import BAR, SIZE, VIEW_LENGTHS
 
 Picture = NDArray[np.uint8]
 """Red, green, blue; shape (height, width, 3)."""

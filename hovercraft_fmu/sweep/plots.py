@@ -10,7 +10,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from ..view.plots import SEA, check_plot, new_figure
+from ..view.palette import SEA, SHADES
+from ..view.plots import check_plot, new_figure
 from .quantities import display
 from .store import KEY, TRAJECTORIES, load
 from .study import GRID
@@ -25,7 +26,6 @@ PANEL = (4.4, 3.6)
 """Inches."""
 FEW = 200
 """Points up to which each has a marker of its own."""
-COLORS = "viridis"
 
 
 def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
@@ -112,7 +112,7 @@ def _heat_map(axes: "Axes", values: NDArray[np.float64], x: NDArray[np.float64],
     columns, rows = np.unique(x), np.unique(y)
     grid = np.full((len(rows), len(columns)), np.nan)
     grid[np.searchsorted(rows, y), np.searchsorted(columns, x)] = values
-    image = axes.pcolormesh(columns, rows, grid, cmap=COLORS, shading="nearest")
+    image = axes.pcolormesh(columns, rows, grid, cmap=SHADES, shading="nearest")
     figure: Figure = axes.figure  # type: ignore[assignment]
     figure.colorbar(image, ax=axes)
     finite = grid[np.isfinite(grid)]
@@ -122,7 +122,7 @@ def _heat_map(axes: "Axes", values: NDArray[np.float64], x: NDArray[np.float64],
 
 
 def _cloud(axes: "Axes", values: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
-    dots = axes.scatter(x, y, c=values, cmap=COLORS, s=16 if len(x) <= FEW else 3)
+    dots = axes.scatter(x, y, c=values, cmap=SHADES, s=16 if len(x) <= FEW else 3)
     figure: Figure = axes.figure  # type: ignore[assignment]
     figure.colorbar(dots, ax=axes)
 
@@ -138,7 +138,7 @@ def _paths(trajectories: pa.Table, table: Mapping[str, NDArray[np.float64]], by:
     chosen = np.unique(np.linspace(0, len(runs) - 1, min(PATHS, len(runs))).astype(int))
     figure = new_figure(figsize=(8.0, 6.0), dpi=110, layout="constrained")
     axes = figure.add_subplot()
-    paths = LineCollection([lines[i] for i in chosen], cmap=COLORS, linewidths=0.8, alpha=0.8)
+    paths = LineCollection([lines[i] for i in chosen], cmap=SHADES, linewidths=0.8, alpha=0.8)
     paths.set_array(table[by][runs[chosen]])
     axes.add_collection(paths)
     axes.autoscale_view()

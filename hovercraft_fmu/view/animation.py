@@ -13,7 +13,8 @@ from PIL import Image, ImageColor
 
 from ..fmu.icon import outline
 from ..simulation import Result
-from .plots import PORT, STARBOARD, new_figure
+from .palette import FAINT_LINE, INK, JETS, METHODS, OTHER, QUIET, SERIES
+from .plots import new_figure
 from .shapes import Shape, jets, placed
 
 if TYPE_CHECKING:
@@ -26,15 +27,11 @@ FRAME_TIME = 75
 """ms"""
 LAST_FRAME_TIME = 2000
 """ms"""
-COLORS = ("#0072b2", "#d55e00")
-"""Of the first and the second setting: blue and vermilion, which colour-blind people tell apart (Okabe and Ito)."""
-JETS = {"thrust": "#f0b429", "port": PORT, "starboard": STARBOARD}
 STAGES = {"rk4": " of 4 stages", "adaptive": " of 6 stages"}
 """So many times these work out the loads in a sub-step; the others once. (What adaptive refused is not counted.)"""
 LEGEND_LINE = 100
 """characters"""
-INK = "#000000"
-SHADES = 8
+STRENGTHS = 8
 """Of a colour, in a GIF."""
 PATH_POINTS = 2000
 """Of a path in a page, at most."""
@@ -109,7 +106,7 @@ def animate(results: Sequence[Result], path: str | os.PathLike[str], tell: Tell 
         raise ValueError(f"results = {len(results)} runs: must be one or two")
     if not np.array_equal(results[0]["time"], results[-1]["time"]):
         raise ValueError("results: must have the same communication points")
-    tracks = [Track(*each) for each in zip(results, _names(results), COLORS, strict=False)]
+    tracks = [Track(*each) for each in zip(results, _names(results), _colors(results), strict=True)]
     path.parent.mkdir(parents=True, exist_ok=True)
     (_write_gif if path.suffix == ".gif" else _write_page)(tracks, path, tell)
     return path
@@ -126,6 +123,12 @@ def _names(results: Sequence[Result]) -> list[str]:
         substeps = f"{result['substeps'][-1]:,} sub-steps".replace(",", " ")
         names.append(f"{setting}: {substeps}{STAGES.get(run.settings.integrator.name, '')}")
     return names
+
+
+def _colors(results: Sequence[Result]) -> list[str]:
+    """Of the methods; where both are the same, the second has another."""
+    first, *rest = (METHODS[result.run.settings.integrator.name].color for result in results)
+    return [first, *(OTHER if color == first else color for color in rest)]
 
 
 def apart(tracks: Sequence[Track]) -> NDArray[np.float64]:
@@ -180,8 +183,8 @@ def _write_gif(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
 
 def _palette() -> Image.Image:
     """Every colour, from white to full: smooth edges need what is between."""
-    full = np.array([ImageColor.getrgb(color) for color in (INK, *COLORS, *JETS.values())])
-    shares = np.arange(SHADES + 1)[:, None, None] / SHADES
+    full = np.array([ImageColor.getrgb(color) for color in (INK, *(style.color for style in SERIES), *JETS.values())])
+    shares = np.arange(STRENGTHS + 1)[:, None, None] / STRENGTHS
     image = Image.new("P", (1, 1))
     image.putpalette(np.rint(255 + shares * (full - 255)).astype(int).ravel().tolist())
     return image
@@ -230,7 +233,7 @@ class MovingPicture:
         axes.set_title(f"close up; lines every {length:g} m", fontsize="small", loc="left")
         axes.set_xticks([])
         axes.set_yticks([])
-        (ground,) = axes.plot([], [], color="#b0b0b0", linewidth=0.6, animated=True)
+        (ground,) = axes.plot([], [], color=FAINT_LINE, linewidth=0.6, animated=True)
         return ground
 
     def frame(self, i: int) -> Image.Image:
@@ -307,11 +310,11 @@ class _Mover:
 def _draw_apart(axes: "Axes", tracks: Sequence[Track]) -> "Line2D":
     """The distance over time, where there is any; returns the mark that moves along it."""
     distance = apart(tracks)
-    axes.plot(tracks[0].result["time"], distance, color="#555555", linewidth=1.2)
+    axes.plot(tracks[0].result["time"], distance, color=QUIET, linewidth=1.2)
     if distance.any():
         axes.set_yscale("log")
         axes.set_ylim(max(distance[distance > 0.0].min(), DECADES * distance.max()), 2.0 * distance.max())
-    (mark,) = axes.plot([], [], color="black", marker="o", markersize=5, animated=True)
+    (mark,) = axes.plot([], [], color=INK, marker="o", markersize=5, animated=True)
     axes.set_title("apart [m]", fontsize="small", loc="left")
     axes.set_xlabel("time [s]", fontsize="small")
     axes.tick_params(labelsize="small")
@@ -342,7 +345,7 @@ def _write_page(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
     if two:
         kept = _kept(tracks[0])
         line = {"x": tracks[0].result["time"][kept], "y": apart(tracks)[kept]}
-        figure.add_trace(graphs.Scatter(**line, showlegend=False, line_color="#555555", hovertemplate=POINTED_AT), 1, 2)
+        figure.add_trace(graphs.Scatter(**line, showlegend=False, line_color=QUIET, hovertemplate=POINTED_AT), 1, 2)
     fixed = len(figure.data)
     chosen = _frames(tracks)
     for trace, column in _moving_traces(tracks, chosen[0]):
@@ -394,7 +397,7 @@ def _moving_traces(tracks: Sequence[Track], i: int) -> list[tuple[dict[str, Any]
         traces.append(({**plain, **_columns(track.hull(i)), **fill, "line": {"color": track.color, "width": 2}}, 1))
     if len(tracks) == 2:
         mark = {"x": [tracks[0].result["time"][i]], "y": [apart(tracks)[i]]}
-        traces.append(({**plain, **mark, "mode": "markers", "marker": {"color": "black", "size": 8}}, 2))
+        traces.append(({**plain, **mark, "mode": "markers", "marker": {"color": INK, "size": 8}}, 2))
     return traces
 
 

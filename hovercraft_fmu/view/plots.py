@@ -12,6 +12,7 @@ from ..coupling import Passage
 from ..fmu.icon import outline
 from ..model.craft import Craft
 from ..simulation import Result
+from .palette import CRAFT, INK, PORT, QUIET, SEA, STARBOARD, SWAY, WIND
 from .shapes import placed
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
 CRAFT_COUNT = 25
 """Outlines along the path."""
-SEA, CRAFT, PORT, STARBOARD, SWAY, WIND = "#0b4f6c", "#d3e7f0b0", "#c8102e", "#2a9d4b", "#f08a24", "#5b7f95"
-"""Port is red, starboard is green, as at sea."""
 
 
 def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
@@ -116,12 +115,12 @@ def _draw_course(axes: "Axes", passage: Passage) -> None:
     """The legs, and the circles in which a waypoint is reached."""
     start = (passage["pose.x"][0], passage["pose.y"][0])
     x, y = np.array([start, *passage.waypoints]).T
-    axes.plot(x, y, color="grey", linestyle="--", linewidth=1.0)
+    axes.plot(x, y, color=QUIET, linestyle="--", linewidth=1.0)
     angle = np.linspace(0.0, 2.0 * np.pi, 60)
     for number, point in enumerate(passage.waypoints, 1):
         circle_x = point[0] + passage.acceptance_radius * np.cos(angle)
         circle_y = point[1] + passage.acceptance_radius * np.sin(angle)
-        axes.plot(circle_x, circle_y, color="grey", linewidth=1.0)
+        axes.plot(circle_x, circle_y, color=QUIET, linewidth=1.0)
         axes.annotate(f"{number}", point, ha="center", va="center", zorder=4)
 
 
@@ -193,7 +192,7 @@ def _draw_controls(
 
 def _draw_speed(axes: "Axes", result: Result) -> None:
     time = result["time"]
-    axes.plot(time, result["speed"], color="black", linewidth=1.6, label="speed")
+    axes.plot(time, result["speed"], color=INK, linewidth=1.6, label="speed")
     axes.plot(time, result["body.surge"], color=SEA, label="surge")
     axes.plot(time, result["body.sway"], color=SWAY, label="sway")
     axes.set_ylabel("[m/s]")

@@ -10,6 +10,7 @@ from ..fmu.icon import outline
 from ..model.craft import Craft
 from ..model.dynamics import Controls
 from .camera import Camera, Point
+from .palette import FAINT, GRID, GROUND, HULL, PANEL, TEXT, TRAIL, WARNING, WINDOW_JETS
 from .shapes import jets
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
@@ -32,10 +33,6 @@ UNSEEN = ("dummy", "offscreen")
 TRAIL_POINTS = 600
 TRAIL_SPACING = 5.0
 """pixels"""
-GROUND, GRID, PANEL, HULL, EDGE = "#0a3a50", "#114a64", "#06222f", "#fbfbff", "#01161e"
-TRAIL, TEXT, FAINT, WARNING = "#7fc8e8", "#e8f4fa", "#7fa6b8", "#f6ae2d"
-JETS = {"thrust": "#f6ae2d", "port": "#ff6b6b", "starboard": "#58d68d"}
-"""Port is red, starboard is green, as at sea."""
 HELP = (
     ("up, down", "more thrust, less thrust: 1 N/s while held"),
     ("right, left", "turn to starboard, to port: a bow thruster while held"),
@@ -162,8 +159,8 @@ class Window:
         applied = shown.controls
         for name, corners in jets(self._craft, applied.thrust, applied.port, applied.starboard).items():
             for points in camera.copies(camera.body(shown.pose, corners)):
-                pygame.draw.polygon(view, JETS[name], points)
-                pygame.draw.aalines(view, JETS[name], True, points)
+                pygame.draw.polygon(view, WINDOW_JETS[name], points)
+                pygame.draw.aalines(view, WINDOW_JETS[name], True, points)
 
     # ---- the words
 
@@ -209,7 +206,7 @@ class Window:
         x, y = place[0] + 108, place[1] + 36
         pygame.draw.rect(screen, GRID, (x, y, width, 16), border_radius=4)
         zero, end = (x + width * (min(max(each, low), high) - low) / span for each in (0.0, thrust))
-        pygame.draw.rect(screen, JETS["thrust"], (min(zero, end), y, abs(end - zero), 16), border_radius=4)
+        pygame.draw.rect(screen, WINDOW_JETS["thrust"], (min(zero, end), y, abs(end - zero), 16), border_radius=4)
 
     def _draw_value(self, screen: "pygame.Surface", place: tuple[int, int], name: str, text: str) -> None:
         self._write(screen, name, (place[0], place[1] + 12), FAINT)
