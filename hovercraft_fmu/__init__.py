@@ -2,6 +2,7 @@
 
 from ._version import __version__
 from .fmu.python_package import build_fmu
-from .simulation import Result, SimulationError, simulate
+from .host import SimulationError
+from .simulation import Result, simulate
 
 __all__ = ["Result", "SimulationError", "__version__", "build_fmu", "simulate"]

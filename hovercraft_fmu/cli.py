@@ -31,9 +31,10 @@ from .coupling import Passage, sail
 from .fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from .fmu.native_package import build_native_fmu, has_compiler
 from .fmu.python_package import build_fmu
+from .host import SimulationError
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES, VOYAGES
-from .simulation import DEFAULT_FMU, Inputs, Result, SimulationError, default_fmu, plan, simulate
+from .simulation import DEFAULT_FMU, Inputs, Result, default_fmu, plan, simulate
 from .ssp import build_ssp
 from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE

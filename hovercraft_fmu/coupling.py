@@ -17,18 +17,12 @@ from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
 from .autopilot.pilot_package import build_autopilot
 from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
 from .fmu.variable import Model
+from .host import SimulationError
 from .model.craft import Craft
 from .model.dynamics import Controls, State
 from .model.subcycling import Settings, advance
 from .scenes import Voyage, voyage
-from .simulation import (
-    Progress,
-    SimulationError,
-    default_fmu,
-    loaded,
-    path_length,
-    write_csv,
-)
+from .simulation import Progress, default_fmu, loaded, path_length, write_csv
 
 JACOBI, GAUSS_SEIDEL = SCHEMES = ("jacobi", "gauss_seidel")
 """Both parts step side by side, with what the other one showed before; or the autopilot steps first, and the craft

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from .fmu.interface import ACTION, BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, MOTION, STATES, SUBSTEPS_MAX, WATCHED
 from .fmu.python_package import build_fmu
 from .fmu.variable import Enumeration
+from .host import SimulationError
 from .model.craft import Craft, preset
 from .model.dynamics import Controls, State
 from .model.integrators import integrator
@@ -40,10 +41,6 @@ Progress: TypeAlias = Callable[[float], None]
 VERSIONS = ("2.0", "3.0")
 """Of FMI, that are run here."""
 DEFAULT_FMU = Path("build") / f"{HOVERCRAFT.name}.fmu"
-
-
-class SimulationError(RuntimeError):
-    """A run that the FMU or the master ended; the message is the FMU's own."""
 
 
 def method_in_words(integrator: str, step_size: float, tolerance: float) -> str:

@@ -16,7 +16,8 @@ from lxml import etree
 
 from . import hosts
 from .fmu.interface import HOVERCRAFT
-from .simulation import SimulationError, instantiated, read_description
+from .host import SimulationError
+from .simulation import instantiated, read_description
 
 STEPS = 5
 SCHEMAS = Path(fmpy.__file__).parent / "schema"

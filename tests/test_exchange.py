@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hovercraft_fmu.fmu.interface import BY_NAME, DERIVATIVES, INPUT_HELD, INPUTS, MOTION, STATES, WATCHED
+from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import (
     Controls,
@@ -29,7 +30,7 @@ from hovercraft_fmu.model.dynamics import (
 )
 from hovercraft_fmu.model.observation import observe_action, observe_motion
 from hovercraft_fmu.scenes import SCENES, Scene, held
-from hovercraft_fmu.simulation import SimulationError, plan, read_description
+from hovercraft_fmu.simulation import plan, read_description
 from hovercraft_fmu.studies.model_exchange import SMOOTH, TOLERANCES, Calls, solved
 from hovercraft_fmu.studies.reference_end import reference_end
 from hovercraft_fmu.studies.trade import STOP_TIME

@@ -30,12 +30,12 @@ from hovercraft_fmu.coupling import (
     sail_bare,
 )
 from hovercraft_fmu.fmu.interface import STATES
+from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.hosts import HOSTS
 from hovercraft_fmu.hosts.loops import LOOPS, STEP, STEPS, VOYAGE, loop_in
 from hovercraft_fmu.model.integrators import integrator
 from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import VOYAGES, Voyage
-from hovercraft_fmu.simulation import SimulationError
 from hovercraft_fmu.ssp import build_ssp
 from hovercraft_fmu.studies import closed_loop as study
 from tests.conftest import ROOT

@@ -18,9 +18,10 @@ from rich.table import Table
 
 from ..fmu.interface import BY_NAME, INPUTS, STATES, VARIABLES
 from ..fmu.native_package import build_native_fmu, has_compiler
+from ..host import SimulationError
 from ..model.dynamics import Controls, State
 from ..scenes import SCENES, Row, Scene
-from ..simulation import SimulationError, instantiated, plan, read_description
+from ..simulation import instantiated, plan, read_description
 from .reference_end import reference_end
 from .rows import Setting
 from .trade import ADVISED_SCENE, REPEATS, STOP_TIME, settings

@@ -1,0 +1,89 @@
+"""An FMU file: its description, and what of it an instance needs, extracted."""
+
+import os
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import fmpy
+
+from ..fmu.description import MODEL_NAME
+from .instance import Instance
+
+VERSIONS = ("2.0", "3.0")
+"""Of FMI, that are driven here."""
+NOT_NEEDED = ("documentation/", "sources/")
+"""By an instance: these folders are not extracted."""
+
+
+class Fmu:
+    """An FMU file for co-simulation, FMI 2.0 or 3.0, extracted until it is closed; it makes instances.
+
+        with Fmu(path) as fmu, fmu.instance() as craft, fmu.instance(exchange=True) as solved:
+            craft.start({"mass": 200.0})
+
+    Args:
+        path: the file.
+        model: the name of the model that it must be of; without it any.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: see `read_description`.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], model: str | None = None) -> None:
+        self.path = Path(path)
+        self.description = read_description(self.path, model=model)
+        self.is_fmi_3: bool = self.description.fmiVersion == "3.0"
+        self._folder = tempfile.TemporaryDirectory(prefix="hovercraft_fmu_")
+        self.folder = self._folder.name
+        """Where it was extracted to."""
+        try:
+            fmpy.extract(self.path, unzipdir=self.folder, include=lambda name: not name.startswith(NOT_NEEDED))
+        except Exception:
+            self.close()
+            raise
+
+    def instance(self, exchange: bool = False) -> Instance:
+        """A new instance, for co-simulation or for model exchange.
+
+        Raises:
+            SimulationError: it is not an FMU for that, or it cannot be loaded or instantiated.
+        """
+        return Instance(self.description, self.folder, exchange)
+
+    def close(self) -> None:
+        """Delete what was extracted; its instances must be closed."""
+        self._folder.cleanup()
+
+    def __enter__(self) -> "Fmu":
+        return self
+
+    def __exit__(
+        self, _type: type[BaseException] | None, _error: BaseException | None, _at: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def read_description(path: Path, validate: bool = True, model: str | None = None) -> Any:
+    """fmpy's model description.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: the file is no FMU for co-simulation, FMI 2.0 or 3.0, its description is not valid, or it is of
+            another model than the given one.
+    """
+    if not path.is_file():
+        name = model or MODEL_NAME
+        command = "build" if name == MODEL_NAME else "build --ssp"
+        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu {command}' writes build/{name}.fmu")
+    try:
+        description = fmpy.read_model_description(path, validate=validate)
+    except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
+        raise ValueError(f"{path}: must be an FMU with a valid model description; {error}") from error
+    if description.fmiVersion not in VERSIONS or description.coSimulation is None:
+        raise ValueError(f"{path}: must be an FMU for co-simulation, FMI {' or '.join(VERSIONS)}")
+    if model and description.modelName != model:
+        raise ValueError(f"{path}: is an FMU of the model {description.modelName!r}: must be of {model!r}")
+    return description

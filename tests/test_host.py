@@ -1,0 +1,176 @@
+"""The way in which the package drives an FMU: the same calls for both standards, co-simulation and model exchange."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hovercraft_fmu.fmu.interface import STATES
+from hovercraft_fmu.host import Fmu, Instance, SimulationError
+from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.dynamics import Controls, State, derivatives
+from hovercraft_fmu.model.integrators import integrator
+from hovercraft_fmu.model.subcycling import Settings, advance
+from tests.conftest import FMI_2
+
+CONTROLS = Controls(8.0, 0.5)
+
+
+@pytest.fixture(scope="module")
+def opened(each_fmu: Path) -> Iterator[Fmu]:
+    with Fmu(each_fmu, "Hovercraft") as fmu:
+        yield fmu
+
+
+@pytest.fixture
+def craft(opened: Fmu) -> Iterator[Instance]:
+    with opened.instance() as instance:
+        yield instance
+
+
+def driven(craft: Instance) -> list[float]:
+    controls, states = craft.port("thrust", "port_thruster"), craft.port(*STATES)
+    for k in range(20):
+        controls.set(CONTROLS[:2])
+        craft.step(0.1 * k, 0.1)
+    return states.get()
+
+
+def test_start_values_by_name_and_type(craft: Instance) -> None:
+    """Real, Integer and Enumeration, the last by name, too; the state is that of the bare model."""
+    craft.start({"mass": 200.0, "integrator": "rk4", "step_size": 0.05, "drag_area": 1})
+    mixed = craft.port("substeps", "mass", "integrator", "pose.x", "drag_area")
+    assert mixed.get() == [0, 200.0, 3, 0.0, 1]
+    expected = State()
+    for _ in range(20):
+        expected = advance(expected, CONTROLS, Craft(mass=200.0), 0.1, Settings(0.05, integrator(3))).state
+    assert driven(craft) == pytest.approx(expected, rel=1e-12)
+    assert mixed.get()[0] == 40
+
+
+def test_a_group_of_several_types_is_set_together(craft: Instance) -> None:
+    group = craft.port("integrator", "mass", "drag_area", "step_size")
+    group.set([2, 50.0, 2, 0.01])
+    assert group.get() == [2, 50.0, 2, 0.01]
+
+
+def test_in_initialization_a_port_is_set_and_read(craft: Instance) -> None:
+    controls = craft.port("thrust")
+    craft.set({"mass": 200.0})
+    craft.enter_initialization(start_time=10.0)
+    controls.set([7.0])
+    craft.exit_initialization()
+    assert controls.get() == [7.0]
+    craft.step(10.0, 0.1)
+
+
+def test_memory_of_numpys_is_read_into(craft: Instance) -> None:
+    record = np.zeros((2, 2))
+    states = craft.port("pose.x", "velocity.x")
+    row = states.over(record[1])
+    craft.start({"pose.x": 3.0, "velocity.x": -1.0})
+    states.get_into(row)
+    assert record.tolist() == [[0.0, 0.0], [3.0, -1.0]]
+    for wrong in (np.zeros(3), np.zeros(2, np.float32)):
+        with pytest.raises(ValueError, match=r"must have 2 values of the one type of pose\.x, velocity\.x"):
+            states.over(wrong)
+    with pytest.raises(ValueError, match=r"must have 2 values of the one type of pose\.x, substeps"):
+        craft.port("pose.x", "substeps").over(record[1])
+
+
+def test_a_refusal_says_what_the_fmu_says_and_reset_leads_back(craft: Instance) -> None:
+    """Also where the refusal was fatal, as each of the Python FMU's is; what was warned of is no part of it."""
+    craft.start({"thrust": 99.0})
+    craft.step(0.0, 0.1)
+    with pytest.raises(SimulationError, match=r"^communicationStepSize = -0\.1 s: must be a finite number greater"):
+        craft.step(0.1, -0.1)
+    assert [message.partition(":")[0] for message in craft.messages] == [
+        "thrust = 99.0",
+        "communicationStepSize = -0.1 s",
+    ]
+    craft.reset()
+    with pytest.raises(SimulationError, match=r"^mass = -1.0: must be greater than 0$"):
+        craft.start({"mass": -1.0})
+    craft.reset()
+    craft.start()
+    again = driven(craft)
+    craft.reset()
+    craft.start()
+    assert driven(craft) == again
+
+
+def test_what_is_no_variable_and_no_item(craft: Instance) -> None:
+    with pytest.raises(ValueError, match="nix: must be a variable of Hovercraft"):
+        craft.port("nix")
+    with pytest.raises(ValueError, match="integrator = 'nix': must be one of semi_implicit_euler, "):
+        craft.set({"integrator": "nix"})
+    with pytest.raises(ValueError, match="mass = 'heavy': must be a number"):
+        craft.set({"mass": "heavy"})
+
+
+def test_a_state_is_kept_and_given_back(craft: Instance) -> None:
+    craft.start()
+    driven(craft)
+    states = craft.port(*STATES)
+    there = states.get()
+    kept = craft.save()
+    content = craft.bytes_of(kept)
+    craft.step(2.0, 0.1)
+    craft.restore(kept)
+    craft.forget(kept)
+    assert states.get() == there
+    craft.step(2.0, 0.1)
+    ahead = states.get()
+    assert ahead != there
+    again = craft.state_of(content)
+    craft.restore(again)
+    craft.forget(again)
+    craft.step(2.0, 0.1)
+    assert states.get() == ahead
+
+
+def test_model_exchange(each_native_fmu: Path) -> None:
+    start = State(1.0, 2.0, 0.3, 0.4, 0.5, 0.06)
+    with Fmu(each_native_fmu) as fmu, fmu.instance(exchange=True) as craft:
+        craft.start(dict(zip(STATES, start, strict=True)))
+        assert not craft.update_discrete_states().again
+        craft.enter_continuous_time_mode()
+        x, rates = craft.state_array(), craft.state_array()
+        craft.get_states(x, len(x))
+        assert tuple(x) == start
+        x[2] = 1.0
+        craft.set_time(0.5)
+        craft.set_states(x, len(x))
+        craft.get_derivatives(rates, len(rates))
+        assert list(rates) == pytest.approx(derivatives(start._replace(heading=1.0), Controls(), Craft()), rel=1e-12)
+        assert not craft.complete_step()
+        craft.enter_event_mode()
+
+
+def test_an_fmu_without_model_exchange(fmu: Path) -> None:
+    with Fmu(fmu) as opened, pytest.raises(SimulationError, match="Hovercraft: must be an FMU for model exchange"):
+        opened.instance(exchange=True)
+
+
+@FMI_2
+def test_slopes_of_inputs(each_native_fmu: Path) -> None:
+    """A ramp of thrust over one long step is that ramp in many short ones, held at their middles, to the square."""
+    ends = []
+    for parts in (1, 200):
+        with Fmu(each_native_fmu) as fmu, fmu.instance() as craft:
+            thrust, states = craft.port("thrust"), craft.port(*STATES)
+            craft.start({"integrator": "rk4", "step_size": 0.01})
+            for k in range(parts):
+                thrust.set([(0.0 if parts == 1 else (k + 0.5) / parts) * 10.0])
+                if parts == 1:
+                    thrust.set_slopes([5.0])
+                craft.step(2.0 * k / parts, 2.0 / parts)
+            ends.append(states.get())
+    assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+
+
+def test_fmi_3_has_no_slopes_to_set(native3_fmu: Path) -> None:
+    refused = pytest.raises(ValueError, match=r"slopes: must be of inputs of FMI 2\.0")
+    with Fmu(native3_fmu) as fmu, fmu.instance() as craft, refused:
+        craft.port("thrust").set_slopes([1.0])
