@@ -8,7 +8,7 @@ from typing import Any
 
 import fmpy
 
-from ..fmu.description import MODEL_NAME
+from ..fmu. import MODEL_NAME
 from .instance import Instance
 
 VERSIONS = ("2.0", "3.0")
