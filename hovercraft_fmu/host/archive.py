@@ -8,7 +8,7 @@ from typing import Any
 
 import fmpy
 
-from ..fmu. import MODEL_NAME
+from ..fmu.interface import HOVERCRAFT
 from .instance import Instance
 
 VERSIONS = ("2.0", "3.0")
@@ -75,8 +75,8 @@ def read_description(path: Path, validate: bool = True, model: str | None = None
             another model than the given one.
     """
     if not path.is_file():
-        name = model or MODEL_NAME
-        command = "build" if name == MODEL_NAME else "build --ssp"
+        name = model or HOVERCRAFT.name
+        command = "build" if name == HOVERCRAFT.name else "build --ssp"
         raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu {command}' writes build/{name}.fmu")
     try:
         description = fmpy.read_model_description(path, validate=validate)
