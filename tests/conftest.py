@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 
 from hovercraft_fmu import build_fmu
@@ -20,39 +21,71 @@ settings.load_profile("repeatable")
 
 ROOT = Path(__file__).parent.parent
 Fresh: TypeAlias = Callable[..., str]
+Built: TypeAlias = Callable[[str, Callable[[Path], Path]], Path]
+
+
+HERE = {"linux": ["x86_64-linux"], "win32": ["x86_64-windows"], "darwin": ["x86_64-darwin", "aarch64-darwin"]}
+"""Platforms that a machine needs of a native FMU."""
 
 
 @pytest.fixture(scope="session")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """Make an archive of this tree once a run: whichever of pytest's workers asks first makes it, the others wait."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "built"
+    folder.mkdir(exist_ok=True)
+
+    def once(name: str, make: Callable[[Path], Path]) -> Path:
+        with FileLock(folder / f"{name}.lock"):
+            return folder / name if (folder / name).exists() else make(folder / name)
+
+    return once
+
+
+@pytest.fixture(scope="session")
+def fmu(built: Built) -> Path:
     """The FMU of this tree."""
-    return build_fmu(tmp_path_factory.mktemp("fmu") / "Hovercraft.fmu")
+    return built("Hovercraft.fmu", build_fmu)
 
 
-def _native(flavour: Flavour, variable: str, folder: Path) -> Path:
+def _native(flavour: Flavour, variable: str, built: Built) -> Path:
     """A native FMU of this tree, or the one that an environment variable names (a sanitized one, for example)."""
     if given := os.environ.get(variable):
         return Path(given)
+    _compiler_or_skip()
+    platforms = HERE[sys.platform]
+    return built(f"{flavour.identifier}.fmu", lambda path: build_native_fmu(path, flavour, platforms))
+
+
+def _compiler_or_skip() -> None:
     if not has_compiler():
         pytest.skip("no ziglang: pip install 'hovercraft-fmu[native]'")
-    return build_native_fmu(folder / f"{flavour.identifier}.fmu", flavour)
 
 
 @pytest.fixture(scope="session")
-def native_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The native FMU, FMI 2.0."""
-    return _native(NATIVE, "NATIVE_FMU", tmp_path_factory.mktemp("native"))
+def native_fmu(built: Built) -> Path:
+    """The native FMU, FMI 2.0, for this machine alone."""
+    return _native(NATIVE, "NATIVE_FMU", built)
 
 
 @pytest.fixture(scope="session")
-def native3_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The native FMU, FMI 3.0."""
-    return _native(NATIVE3, "NATIVE3_FMU", tmp_path_factory.mktemp("native3"))
+def native3_fmu(built: Built) -> Path:
+    """The native FMU, FMI 3.0, for this machine alone."""
+    return _native(NATIVE3, "NATIVE3_FMU", built)
 
 
 @pytest.fixture(scope="session")
-def autopilot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def complete_native_fmu(standard: int, built: Built) -> Path:
+    """The native FMU of FMI 2.0, then that of FMI 3.0, for every platform."""
+    _compiler_or_skip()
+    flavour = NATIVE if standard == 2 else NATIVE3
+    return built(f"{flavour.identifier}Complete.fmu", lambda path: build_native_fmu(path, flavour))
+
+
+@pytest.fixture(scope="session")
+def autopilot(built: Built) -> Path:
     """The autopilot's FMU of this tree."""
-    return build_autopilot(tmp_path_factory.mktemp("autopilot") / "Autopilot.fmu")
+    return built("Autopilot.fmu", build_autopilot)
 
 
 @pytest.fixture(scope="session", params=["python", "native", "native3"])
@@ -77,7 +110,7 @@ def each_fmi_2_fmu(request: pytest.FixtureRequest) -> Path:
 
 @pytest.fixture(scope="session", params=[2, 3])
 def standard(request: pytest.FixtureRequest) -> int:
-    """The version of FMI of `each_native_fmu`."""
+    """The version of FMI of `each_native_fmu` and `complete_native_fmu`."""
     return int(request.param)
 
 

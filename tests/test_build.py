@@ -8,11 +8,15 @@ from pathlib import Path
 import pytest
 
 from hovercraft_fmu import build_fmu
-from tests.conftest import ROOT, Fresh
+from tests.conftest import HERE, ROOT, Fresh
 
 BUILD = "import sys, os; os.umask(int(sys.argv[1], 8)); import hovercraft_fmu as h; print(h.build_fmu(), h.__file__)"
 
-BUILD_NATIVE = "from hovercraft_fmu.fmu.native_package import build_native_fmu; build_native_fmu()"
+BUILD_NATIVE = """
+import sys
+from hovercraft_fmu.fmu.native_package import build_native_fmu
+build_native_fmu(platforms=sys.argv[1:])
+"""
 
 
 def digest(path: Path) -> str:
@@ -35,7 +39,7 @@ def test_the_same_bytes_from_an_installed_wheel(fmu: Path, native_fmu: Path, fre
     printed = fresh(BUILD, "022", env={"PYTHONPATH": str(installed)})
     assert printed.split()[1].startswith(str(installed))
     assert digest(tmp_path / "build" / "Hovercraft.fmu") == digest(fmu)
-    fresh(BUILD_NATIVE, env={"PYTHONPATH": str(installed)})
+    fresh(BUILD_NATIVE, *HERE[sys.platform], env={"PYTHONPATH": str(installed)})
     assert digest(tmp_path / "build" / "HovercraftNative.fmu") == digest(native_fmu)
 
 

@@ -77,9 +77,9 @@ class Unpacked(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def unpacked(each_native_fmu: Path, standard: int, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
+def unpacked(complete_native_fmu: Path, standard: int, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
     folder = tmp_path_factory.mktemp("unpacked")
-    with zipfile.ZipFile(each_native_fmu) as archive:
+    with zipfile.ZipFile(complete_native_fmu) as archive:
         archive.extractall(folder)
     (folder / "sources" / "runs.h").write_text(runs_header())
     return Unpacked(folder, NATIVE if standard == 2 else NATIVE3)

@@ -6,7 +6,8 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -73,12 +74,15 @@ def has_compiler() -> bool:
     return importlib.util.find_spec("ziglang") is not None
 
 
-def build_native_fmu(path: str | os.PathLike[str] | None = None, flavour: Flavour = NATIVE) -> Path:
+def build_native_fmu(
+    path: str | os.PathLike[str] | None = None, flavour: Flavour = NATIVE, platforms: Iterable[str] = tuple(PLATFORMS)
+) -> Path:
     """Write the native FMU of a flavour to `path` (its folder is made) and return the path.
 
     Args:
         path: the file; without it build/HovercraftNative.fmu or build/HovercraftNative3.fmu.
         flavour: NATIVE or NATIVE3: FMI 2.0 or FMI 3.0.
+        platforms: keys of PLATFORMS, to compile for.
 
     Raises:
         ModuleNotFoundError: no compiler.
@@ -87,7 +91,7 @@ def build_native_fmu(path: str | os.PathLike[str] | None = None, flavour: Flavou
     """
     if not has_compiler():
         raise ModuleNotFoundError("the native FMU needs a C compiler: pip install 'hovercraft-fmu[native]'")
-    return write_fmu(path or f"build/{flavour.identifier}.fmu", lambda: _archive(flavour))
+    return write_fmu(path or f"build/{flavour.identifier}.fmu", lambda: _archive(flavour, platforms))
 
 
 def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
@@ -100,7 +104,7 @@ def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
     return {**files, "variables.h": variables_header(build).encode()}
 
 
-def _archive(flavour: Flavour) -> bytes:
+def _archive(flavour: Flavour, platforms: Iterable[str]) -> bytes:
     files = {
         **{f"documentation/{name}": content for name, content in documents(flavour).items()},
         "documentation/licenses/fdlibm.txt": _sun_notice(),
@@ -119,7 +123,7 @@ def _archive(flavour: Flavour) -> bytes:
             **files,
             **{f"sources/{name}": content for name, content in c_files.items()},
             "modelDescription.xml": xml(model_description(build, flavour)),
-            **_binaries(c_files, flavour),
+            **_binaries(c_files, flavour, platforms),
         }
     )
 
@@ -131,13 +135,15 @@ def _sun_notice() -> bytes:
     return "".join(line.removeprefix("   ") + "\n" for line in lines).encode()
 
 
-def _binaries(c_files: Mapping[str, bytes], flavour: Flavour) -> dict[str, bytes]:
-    with tempfile.TemporaryDirectory(prefix="hovercraft_native_") as folder:
+def _binaries(c_files: Mapping[str, bytes], flavour: Flavour, platforms: Iterable[str]) -> dict[str, bytes]:
+    names = list(platforms)
+    with tempfile.TemporaryDirectory(prefix="hovercraft_native_") as folder, ThreadPoolExecutor() as side_by_side:
         for name, content in c_files.items():
             (Path(folder) / name).write_bytes(content)
-        built = {name: compiled(Path(folder), platform, flavour) for name, platform in PLATFORMS.items()}
+        made = side_by_side.map(lambda name: compiled(Path(folder), PLATFORMS[name], flavour), names)
+        built = dict(zip(names, made, strict=True))
     files = {library(name, flavour): content for name, content in built.items()}
-    if flavour.fmi == 2:
+    if flavour.fmi == 2 and {"x86_64-darwin", "aarch64-darwin"} <= built.keys():
         both = (built["x86_64-darwin"], built["aarch64-darwin"])
         files[library("x86_64-darwin", flavour)] = universal(both)
     return {f"binaries/{name}": content for name, content in files.items()}
@@ -151,16 +157,16 @@ def library(name: str, flavour: Flavour) -> str:
 
 def compiled(folder: Path, platform: Platform, flavour: Flavour = NATIVE) -> bytes:
     """The library of the sources in `folder`. Raises OSError with what the compiler said."""
-    output = f"{flavour.identifier}{platform.suffix}"
-    command = [*compiler(platform), *LIBRARY, *flavour.sources, *platform.options, "-o", output]
-    if platform.suffix == ".dylib":
-        command.append(f"-Wl,-install_name,@rpath/{output}")
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise OSError(f"compiling for {platform.target} failed: {done.stderr.strip()}")
-    content = (folder / output).read_bytes()
-    (folder / output).unlink()
-    return content
+    name = f"{flavour.identifier}{platform.suffix}"
+    with tempfile.TemporaryDirectory(dir=folder) as apart:
+        output = Path(apart) / name
+        command = [*compiler(platform), *LIBRARY, *flavour.sources, *platform.options, "-o", str(output)]
+        if platform.suffix == ".dylib":
+            command.append(f"-Wl,-install_name,@rpath/{name}")
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise OSError(f"compiling for {platform.target} failed: {done.stderr.strip()}")
+        return output.read_bytes()
 
 
 def compiler(platform: Platform) -> list[str]:
