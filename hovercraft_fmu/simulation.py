@@ -273,7 +273,13 @@ def _scene_values(chosen: Scene | None, preset_name: str | None) -> dict[str, fl
 
 
 def _start_values(given: Mapping[str, Value]) -> dict[str, float | int]:
-    return {name: start_value(name, value) for name, value in given.items()}
+    values = {name: start_value(name, value) for name, value in given.items()}
+    for name, beside in HOVERCRAFT.choices.items():  # from here on the Enumeration alone says it
+        if beside.name in values:
+            number = int(values.pop(beside.name))
+            HOVERCRAFT.check_choice(name, number)
+            values[name] = HOVERCRAFT.chosen(name, int(values.get(name, BY_NAME[name].start or 0)), number)
+    return values
 
 
 def start_value(name: str, value: Value) -> float | int:

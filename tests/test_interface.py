@@ -59,6 +59,8 @@ TABLE = {
     "skirt_friction": ("parameter", "tunable", "exact", "1", "0.0"),
     "gravity": ("parameter", "fixed", "exact", "m/s2", "9.80665"),
     "rotational_drag": ("parameter", "tunable", "exact", "1", "0.0"),
+    "integrator_number": ("parameter", "fixed", "exact", None, "0"),
+    "drag_area_number": ("parameter", "fixed", "exact", None, "0"),
 }
 DERIVATIVES = {
     "velocity.x": "pose.x",

@@ -35,6 +35,17 @@ ENUMERATIONS = (INTEGRATOR, DRAG_AREA)
 
 _CRAFT = Craft()
 
+
+def _number_of(reference: int, name: str, enumeration: Enumeration) -> Variable:
+    """The Integer beside an Enumeration."""
+    return Variable(
+        reference, f"{name}_number", "parameter", "fixed", None, 0,
+        f"For a host that sets no Enumerations: 0 (as {name} says), {enumeration.listed}; it comes before {name}, "
+        "which must be left as it is or be the same",
+        kind="Integer", minimum=0, maximum=len(enumeration.items), chooses=name,
+    )  # fmt: skip
+
+
 VARIABLES: tuple[Variable, ...] = (
     # -- inputs
     Variable(0, "thrust", "input", "continuous", "N", 5.0,
@@ -143,6 +154,8 @@ VARIABLES: tuple[Variable, ...] = (
     Variable(44, "rotational_drag", "parameter", "tunable", "1", _CRAFT.rotational_drag,
              "Share of the moment of the air on the rotating box about its own centre; 0 is off",
              minimum=0.0, maximum=1.0),
+    _number_of(45, "integrator", INTEGRATOR),
+    _number_of(46, "drag_area", DRAG_AREA),
 )  # fmt: skip
 
 TIME = Variable(1000, "time", "independent", "continuous", "s", None, "Simulation time")

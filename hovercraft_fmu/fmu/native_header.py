@@ -16,6 +16,7 @@ from .interface import (
     DERIVATIVES,
     ENUMERATIONS,
     HELD,
+    HOVERCRAFT,
     INPUT_HELD,
     INPUTS,
     MOTION,
@@ -79,6 +80,11 @@ struct method {{
     double rotation_limit;  /* rad */
 }};
 
+struct choice {{
+    unsigned enumeration;
+    unsigned number;        /* of the integer beside it */
+}};
+
 struct craft_field {{
     unsigned reference;
     size_t offset;          /* in struct craft */
@@ -97,6 +103,9 @@ static const struct variable VARIABLES[] = {{
 }};
 static const struct method METHODS[] = {{
 {methods}
+}};
+static const struct choice CHOICES[] = {{
+{choices}
 }};
 static const struct craft_field CRAFT_FIELDS[] = {{
 {craft_fields}
@@ -129,6 +138,8 @@ OF_A_KIND = {
     "tolerance": "TOLERANCE_RULE",
     "integrator": "INTEGRATOR_RULE",
     "drag_area": "DRAG_AREA_RULE",
+    "integrator_number": "INTEGRATOR_NUMBER_RULE",
+    "drag_area_number": "DRAG_AREA_NUMBER_RULE",
 }
 RULES = ("ANY", "POSITIVE", "NOT_NEGATIVE", *OF_A_KIND.values())
 
@@ -166,6 +177,9 @@ def variables_header(build: str) -> str:
         methods="\n".join(
             f"    {{{_quoted(m.name)}, {_number(m.stability_limit)}, {_number(m.rotation_limit)}}},"
             for m in INTEGRATORS
+        ),
+        choices="\n".join(
+            f"    {{{constant(name)}, {constant(number.name)}}}," for name, number in HOVERCRAFT.choices.items()
         ),
         craft_fields="\n".join(
             f"    {{{constant(field.name)}, offsetof(struct craft, {field.name})}}," for field in fields(Craft)
@@ -218,8 +232,7 @@ def _rule(name: str) -> str:
 def _list(enumeration: Enumeration) -> str:
     """How many items it has, and how a message lists them."""
     name = re.sub("(?<=[a-z])(?=[A-Z])", "_", enumeration.type_name).upper()
-    known = ", ".join(f"{i} ({item})" for i, (item, _) in enumerate(enumeration.items, 1))
-    return f"#define {name}_COUNT {len(enumeration.items)}\n#define {name}_LIST {_quoted(known)}"
+    return f"#define {name}_COUNT {len(enumeration.items)}\n#define {name}_LIST {_quoted(enumeration.listed)}"
 
 
 def _assigned(values: dict[str, int]) -> str:

@@ -60,6 +60,11 @@ class Enumeration:
     items: tuple[tuple[str, str], ...]
     """Name, description."""
 
+    @property
+    def listed(self) -> str:
+        """Its items for a message: '1 (constant), 2 (directional)'."""
+        return ", ".join(f"{number} ({name})" for number, (name, _) in enumerate(self.items, 1))
+
     def number(self, name: str) -> int | None:
         """The number of an item; None: there is none of that name."""
         names = [item for item, _ in self.items]
@@ -86,6 +91,8 @@ class Variable:
     """For a calculated output or parameter: the start values that its own start follows from."""
     enumeration: Enumeration | None = None
     """The choices of a variable of this kind."""
+    chooses: str | None = None
+    """The Enumeration that this Integer stands beside: 0, or the number of an item of it."""
 
     @property
     def initial(self) -> str | None:
@@ -162,3 +169,26 @@ class Model:
     def enumerations(self) -> tuple[Enumeration, ...]:
         """Of its variables, each once."""
         return tuple(dict.fromkeys(v.enumeration for v in self.variables if v.enumeration))
+
+    @cached_property
+    def choices(self) -> Mapping[str, Variable]:
+        """Enumeration -> the Integer beside it."""
+        return {variable.chooses: variable for variable in self.variables if variable.chooses}
+
+    def check_choice(self, enumeration: str, number: int) -> None:
+        """Raises ValueError where the Integer beside an Enumeration is neither 0 nor the number of an item."""
+        items = self.by_name[enumeration].enumeration
+        if items and not 0 <= number <= len(items.items):
+            rule = f"must be 0 (as {enumeration} says) or one of {items.listed}"
+            raise ValueError(f"{self.choices[enumeration].name} = {number}: {rule}")
+
+    def chosen(self, enumeration: str, item: int, number: int) -> int:
+        """The item that an Enumeration and the Integer beside it say together.
+
+        Raises:
+            ValueError: both are set, which an Enumeration is where it has not its start value, and they differ.
+        """
+        if number not in (0, item) and item != self.by_name[enumeration].start:
+            both = f"{enumeration} = {item} and {self.choices[enumeration].name} = {number}"
+            raise ValueError(f"{both}: must be the same where both are set")
+        return number or item

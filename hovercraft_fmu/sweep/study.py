@@ -263,6 +263,8 @@ def _factor(name: str, spec: Any, run: Run, driven: tuple[str, ...]) -> Factor:
         raise ValueError(
             f"sweep.{name} = {spec!r}: must be an input that {run.title} leaves alone: its start value has no effect"
         )
+    if name in BY_NAME and (enumeration := BY_NAME[name].chooses):
+        raise ValueError(f"sweep.{name} = {spec!r}: must be given as sweep.{enumeration}, which it stands beside")
     if isinstance(spec, list):
         if not spec:
             raise ValueError(f"sweep.{name} = []: must have at least one value")

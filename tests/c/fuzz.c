@@ -139,7 +139,7 @@ static int step(void *craft, struct bytes *bytes)
 {
     double size = a_double(bytes);
     const double point = a_byte(bytes) < 240 ? time_of(craft) : a_double(bytes);
-    if (integer_of(craft, V_INTEGRATOR) == ADAPTIVE) {
+    if (integer_of(craft, V_INTEGRATOR) == ADAPTIVE || integer_of(craft, V_INTEGRATOR_NUMBER) == ADAPTIVE) {
         const double turn = real_of(craft, V_VELOCITY_YAW_RATE);
         if (size > 1e-4)
             size = 1e-4 / (1.0 + (isfinite(turn) ? fabs(turn) : 0.0));

@@ -24,9 +24,11 @@ static void *made(struct bytes *bytes)
 
 static int integer_of(void *craft, unsigned reference)
 {
-    int64_t value = 0;
-    fmi3GetInt64(craft, &reference, 1, &value, 1);
-    return (int)value;
+    int64_t item = 0;
+    int32_t number = 0;
+    fmi3GetInt64(craft, &reference, 1, &item, 1);
+    fmi3GetInt32(craft, &reference, 1, &number, 1);
+    return (int)item + number; /* one of the two is refused */
 }
 
 static double time_of(void *craft)

@@ -152,6 +152,22 @@ static enum verdict check_derived(struct instance *instance, const struct craft 
     return FINE;
 }
 
+/* What an enumeration and the integer beside it say together. Refused: both are set, and differ. */
+static enum verdict choose(struct instance *instance, unsigned enumeration, int32_t *item)
+{
+    const int32_t *integers = instance->now.integers;
+    unsigned i = 0;
+    while (CHOICES[i].enumeration != enumeration)
+        i++;
+    const unsigned beside = CHOICES[i].number;
+    const int32_t said = integers[enumeration], number = integers[beside];
+    if (number != 0 && number != said && said != (int32_t)VARIABLES[enumeration].start)
+        return instance_say(instance, REFUSED, "%s = %i and %s = %i: must be the same where both are set",
+                            VARIABLES[enumeration].name, (long long)said, VARIABLES[beside].name, (long long)number);
+    *item = number != 0 ? number : said;
+    return FINE;
+}
+
 /* The craft that the parameters make. */
 static enum verdict make_craft(struct instance *instance, struct craft *craft)
 {
@@ -161,8 +177,8 @@ static enum verdict make_craft(struct instance *instance, struct craft *craft)
         char *field = (char *)craft + CRAFT_FIELDS[i].offset;
         if (VARIABLES[reference].kind == REAL)
             *(double *)(void *)field = now->reals[reference];
-        else
-            *(int32_t *)(void *)field = now->integers[reference];
+        else if (choose(instance, reference, (int32_t *)(void *)field) == REFUSED)
+            return REFUSED;
     }
     if (craft->thrust_max - craft->thrust_min < 0.0)
         return instance_say(instance, REFUSED, "thrust_min = %r N: must not be above thrust_max = %r N",
@@ -186,12 +202,13 @@ static enum verdict take_up_start_values(struct instance *instance)
 {
     struct content *now = &instance->now;
     struct craft craft;
-    if (make_craft(instance, &craft) == REFUSED)
+    int32_t integrator;
+    if (make_craft(instance, &craft) == REFUSED || choose(instance, V_INTEGRATOR, &integrator) == REFUSED)
         return REFUSED;
     now->craft = craft;
     now->settings = (struct settings){
         now->reals[V_STEP_SIZE],
-        now->integers[V_INTEGRATOR],
+        integrator,
         now->hosts_tolerance > 0.0 ? now->hosts_tolerance : now->reals[V_TOLERANCE],
     };
     now->controls = inputs_of(now->reals);
@@ -569,6 +586,12 @@ static const char *broken_rule(enum rule rule, double value)
         return 1.0 <= value && value <= INTEGRATOR_COUNT ? NULL : "must be one of " INTEGRATOR_LIST;
     case DRAG_AREA_RULE:
         return 1.0 <= value && value <= DRAG_AREA_COUNT ? NULL : "must be one of " DRAG_AREA_LIST;
+    case INTEGRATOR_NUMBER_RULE:
+        return 0.0 <= value && value <= INTEGRATOR_COUNT ? NULL
+                                                         : "must be 0 (as integrator says) or one of " INTEGRATOR_LIST;
+    case DRAG_AREA_NUMBER_RULE:
+        return 0.0 <= value && value <= DRAG_AREA_COUNT ? NULL
+                                                        : "must be 0 (as drag_area says) or one of " DRAG_AREA_LIST;
     case ANY:
         break;
     }
@@ -645,7 +668,7 @@ enum verdict instance_set_reals(struct instance *instance, const unsigned *refer
     return FINE;
 }
 
-/* What can be set are items of an enumeration, all of them small numbers. */
+/* What can be set are numbers of items of an enumeration, all of them small. */
 static enum verdict check_integer(struct instance *instance, const struct variable *variable, int64_t value)
 {
     if (!is_settable(instance, variable))

@@ -10,7 +10,7 @@
 
 #include "instance.h"
 
-enum { VERSION = 3, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
+enum { VERSION = 4, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
 static const char MAGIC[] = "HOVERFMU";
 
 enum direction { MEASURE, WRITE, READ };
@@ -188,7 +188,8 @@ static bool is_possible(const struct content *c)
     const int32_t most = INTEGRATOR_COUNT;
     const bool started = instance_has_started(c);
     const int32_t kept = c->integers[V_INTEGRATOR], used = c->settings.integrator;
-    return is_phase_of_use(c) && kept >= 1 && kept <= most && (!started || (used >= 1 && used <= most)) &&
+    const int32_t number = c->integers[V_INTEGRATOR_NUMBER];
+    return is_phase_of_use(c) && kept >= 1 && kept <= most && number >= 0 && number <= most && (!started || (used >= 1 && used <= most)) &&
            c->reals[V_STEP_SIZE] > 0.0 && (!started || c->settings.step_size > 0.0) && c->integers[V_SUBSTEPS] >= 0 &&
            (c->use == CO_SIMULATION || (c->reals[V_SKIRT_FRICTION] == 0.0 && c->craft.skirt_friction == 0.0));
 }

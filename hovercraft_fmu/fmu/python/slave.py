@@ -40,7 +40,7 @@ THRUST, PORT, STARBOARD, WIND_X, WIND_Y = (BY_NAME[name].reference for name in I
 STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
 MOTION_REFERENCES = STATE_REFERENCES + tuple(BY_NAME[name].reference for name in MOTION)
 ACTION_REFERENCES = tuple(BY_NAME[name].reference for name in ACTION + WATCHED)
-CRAFT_REFERENCES = tuple((BY_NAME[name].reference, BY_NAME[name].kind) for name in CRAFT_PARAMETERS)
+CRAFT_VARIABLES = tuple(BY_NAME[name] for name in CRAFT_PARAMETERS)
 STEP_SIZE = BY_NAME["step_size"].reference
 INTEGRATOR = BY_NAME["integrator"].reference
 SUBSTEPS = BY_NAME["substeps"].reference
@@ -158,17 +158,24 @@ class HovercraftSlave(Slave):
             integrator(int(value))
         elif variable.reference == TOLERANCE:
             check_tolerance(value)
+        elif variable.chooses:
+            self.flavour.model.check_choice(variable.chooses, int(value))
+
+    def _chosen(self, enumeration: str) -> int:
+        model = self.flavour.model
+        item, number = (self._integers[v.reference] for v in (model.by_name[enumeration], model.choices[enumeration]))
+        return model.chosen(enumeration, item, number)
 
     def _make_craft(self) -> Craft:
         values: dict[str, Any] = {
-            name: self._reals[reference] if kind == "Real" else self._integers[reference]
-            for name, (reference, kind) in zip(CRAFT_PARAMETERS, CRAFT_REFERENCES, strict=True)
+            name: self._chosen(name) if variable.enumeration else self._reals[variable.reference]
+            for name, variable in zip(CRAFT_PARAMETERS, CRAFT_VARIABLES, strict=True)
         }
         return Craft(**values)
 
     def _take_up_settings(self) -> None:
         tolerance = self._reals[TOLERANCE] if self._hosts_tolerance is None else self._hosts_tolerance
-        self._settings = Settings(self._reals[STEP_SIZE], integrator(self._integers[INTEGRATOR]), tolerance)
+        self._settings = Settings(self._reals[STEP_SIZE], integrator(self._chosen("integrator")), tolerance)
 
     def _take_up_start_values(self) -> None:
         reals = self._reals
@@ -219,5 +226,6 @@ class HovercraftSlave(Slave):
         self._controls = Controls(*state["controls"])
         self._craft = Craft(**dict(zip(CRAFT_PARAMETERS, state["craft"], strict=True)))
         self._reals[PROJECTED_AREA] = self._craft.projected_area
-        self._take_up_settings()
+        if self._started():  # else the start values are taken up, and refused, later
+            self._take_up_settings()
         self._stability, self._rotation, self._proposed = state["stability"], state["rotation"], state["proposed"]
