@@ -25,8 +25,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ._version import __version__
-from .autopilot.pilot_interface import AUTOPILOT
-from .autopilot.pilot_package import build_autopilot
+from .autopilot.pilot_package import AUTOPILOT, build_autopilot
 from .coupling import Passage, sail
 from .fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from .fmu.native_package import build_native_fmu, has_compiler

@@ -7,10 +7,9 @@ from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 from ._version import RELEASE_DATE, __version__
 from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
-from .fmu.description import AUTHOR
-from .fmu.extras import xml
+from .fmu.archive import write_archive, zipped
+from .fmu.description import AUTHOR, xml
 from .fmu.interface import HOVERCRAFT, STATES
-from .fmu.python_package import write_archive, zipped
 from .fmu.variable import Variable
 from .scenes import VOYAGES, Voyage
 
@@ -42,7 +41,7 @@ def build_ssp(
         f"resources/{craft.name}": craft.read_bytes(),
         f"resources/{autopilot.name}": autopilot.read_bytes(),
     }
-    return write_archive(path, ".ssp", lambda: zipped(files))
+    return write_archive(path, lambda: zipped(files), ".ssp")
 
 
 def system_structure(voyage: Voyage, craft: str, autopilot: str) -> Element:

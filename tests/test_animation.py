@@ -15,7 +15,7 @@ import pytest
 from PIL import Image, ImageColor
 
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON
-from hovercraft_fmu.fmu.python_package import documents
+from hovercraft_fmu.fmu.document import documents
 from hovercraft_fmu.simulation import Result, plan, run_model
 from hovercraft_fmu.view.animation import FRAMES, MovingPicture, Track, animate
 from hovercraft_fmu.view.palette import METHODS

@@ -2,7 +2,6 @@
 
 from dataclasses import fields
 
-from ..fmu.description import PYTHON
 from ..fmu.interface import BY_NAME, STATES
 from ..fmu.variable import Model, Variable
 from .guidance import UNITS_OF_GAINS, Gains
@@ -81,4 +80,3 @@ AUTOPILOT_MODEL = Model(
     stop_time=2400.0,
     communication_step=0.5,
 )
-AUTOPILOT = PYTHON.of(AUTOPILOT_MODEL)

@@ -3,11 +3,13 @@
 import os
 from pathlib import Path
 
-from ..fmu.document import rendered
-from ..fmu.python_package import STATIC, Content, write_python_fmu
+from ..fmu.description import PYTHON
+from ..fmu.document import FOLDER, rendered
+from ..fmu.python_package import Content, write_python_fmu
 from .guidance import __doc__ as law
-from .pilot_interface import AUTOPILOT, AUTOPILOT_MODEL
+from .pilot_interface import AUTOPILOT_MODEL
 
+AUTOPILOT = PYTHON.of(AUTOPILOT_MODEL)
 HERE = Path(__file__).parent
 PICTURE = "loop.png"
 """A voyage, as `hovercraft-fmu demo --loop` draws it."""
@@ -23,7 +25,7 @@ def build_autopilot(path: str | os.PathLike[str] = f"build/{AUTOPILOT.identifier
 def _documents() -> dict[str, bytes]:
     values = {"model": AUTOPILOT_MODEL, "variables": AUTOPILOT_MODEL.variables, "types": {}, "law": law}
     pages = {name: page.encode() for name, page in rendered(HERE, values).items()}
-    shared = {name: (STATIC / name).read_bytes() for name in ALWAYS}
+    shared = {name: (FOLDER / name).read_bytes() for name in ALWAYS}
     return {**shared, PICTURE: (HERE / PICTURE).read_bytes(), **pages}
 
 

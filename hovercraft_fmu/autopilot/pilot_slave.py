@@ -7,7 +7,7 @@ from ..fmu.python.life_cycle import Slave, refuse_non_finite
 from ..fmu.variable import Variable
 from ..model.dynamics import State
 from .guidance import Commands, Gains, Pilot, Sight, Waypoint, check_gain, steer
-from .pilot_interface import AUTOPILOT, AUTOPILOT_MODEL, COMMANDS, GAINS, WAYPOINTS_MAX, waypoint_names
+from .pilot_interface import AUTOPILOT_MODEL, COMMANDS, GAINS, WAYPOINTS_MAX, waypoint_names
 
 BY_NAME = AUTOPILOT_MODEL.by_name
 MOTION = tuple(BY_NAME[name].reference for name in STATES)
@@ -24,7 +24,7 @@ WAYPOINTS = tuple(
 class AutopilotSlave(Slave):
     """The autopilot behind the FMI functions of pythonfmu's wrapper."""
 
-    flavour = AUTOPILOT
+    model = AUTOPILOT_MODEL
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .._version import RELEASE_DATE, __version__
 from .interface import CRAFT_PARAMETERS, DERIVATIVES, HOVERCRAFT, INPUTS, STATES, TIME
@@ -182,6 +182,13 @@ def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
         _variable(variables, variable, flavour)
     _structure(SubElement(root, "ModelStructure"), flavour)
     return root
+
+
+def xml(root: Element) -> bytes:
+    """The tree as the content of a file."""
+    indent(root)
+    text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
 
 
 def guid(build: str) -> str:

@@ -51,6 +51,19 @@ def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
     return rendered(FOLDER, values)
 
 
+def documents(flavour: Flavour) -> dict[str, bytes]:
+    """All of documentation/ but licences of others, for one of the hovercraft's FMUs: path -> content."""
+    static = {
+        path.relative_to(FOLDER).as_posix(): path.read_bytes()
+        for path in sorted(FOLDER.rglob("*"))
+        if path.is_file()
+        and path.suffix != ".jinja"
+        and not (flavour.sources and path.name == "externalDependencies.txt")
+    }
+    measured = {f"results/{path.name}": path.read_bytes() for path in sorted(RESULTS.glob("*"))}
+    return {**static, **measured, **{name: page.encode() for name, page in pages(flavour).items()}}
+
+
 def rendered(folder: Path, values: Mapping[str, Any]) -> dict[str, str]:
     """Path -> page, of the templates NAME.html.jinja in a folder; they may include those in FOLDER."""
     environment = jinja2.Environment(

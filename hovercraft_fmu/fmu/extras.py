@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 from .description import Flavour
 from .interface import INPUTS, STATES
@@ -17,13 +17,6 @@ TERMINALS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """Variables that belong together: what a host may connect at once."""
 ICON_SIZE = 100.0
 """Units of the diagram."""
-
-
-def xml(root: Element) -> bytes:
-    """The tree as the content of a file."""
-    indent(root)
-    text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text + b"\n"
 
 
 def build_description(flavour: Flavour, options: Iterable[str]) -> Element:

@@ -14,12 +14,13 @@ from pathlib import Path
 
 import fmpy
 
-from .description import NATIVE, Flavour, model_description
-from .extras import build_description, terminals_and_icons, xml
+from .archive import digest, write_archive, zipped
+from .description import NATIVE, Flavour, model_description, xml
+from .document import documents
+from .extras import build_description, terminals_and_icons
 from .icon import icon_png
 from .mach_o import universal
 from .native_header import variables_header
-from .python_package import digest, documents, write_fmu, zipped
 
 C_FOLDER = Path(__file__).parent / "native"
 FMI_HEADERS = {
@@ -91,7 +92,7 @@ def build_native_fmu(
     """
     if not has_compiler():
         raise ModuleNotFoundError("the native FMU needs a C compiler: pip install 'hovercraft-fmu[native]'")
-    return write_fmu(path or f"build/{flavour.identifier}.fmu", lambda: _archive(flavour, platforms))
+    return write_archive(path or f"build/{flavour.identifier}.fmu", lambda: _archive(flavour, platforms))
 
 
 def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
@@ -114,9 +115,7 @@ def _archive(flavour: Flavour, platforms: Iterable[str]) -> bytes:
     }
     if flavour.fmi == 2:
         files["model.png"] = icon_png()
-    made_by = {"compiler": f"{metadata.version('ziglang')} {OPTIONS} {LIBRARY} {PLATFORMS}".encode()}
-    description = {"modelDescription.xml": xml(model_description("0" * 32, flavour))}
-    build = digest({**files, **sources("0" * 32, flavour), **description, **made_by})
+    build = native_build(flavour)
     c_files = sources(build, flavour)
     return zipped(
         {
@@ -126,6 +125,13 @@ def _archive(flavour: Flavour, platforms: Iterable[str]) -> bytes:
             **_binaries(c_files, flavour, platforms),
         }
     )
+
+
+def native_build(flavour: Flavour) -> str:
+    """What the FMU is: a digest of code, table, compiler and options, but of nothing that is written about it."""
+    made_by = f"{metadata.version('ziglang')} {OPTIONS} {LIBRARY} {PLATFORMS}".encode()
+    table = xml(model_description("0" * 32, flavour))
+    return digest({**sources("0" * 32, flavour), "compiler": made_by, "table": table})
 
 
 def _sun_notice() -> bytes:

@@ -12,7 +12,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from ..autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
-from ..fmu.extras import xml
+from ..fmu.description import xml
 from ..fmu.interface import HOVERCRAFT, STATES
 from ..fmu.variable import Model
 from ..scenes import VOYAGES

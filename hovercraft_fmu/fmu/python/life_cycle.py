@@ -5,11 +5,9 @@ import json
 import math
 from collections.abc import MutableMapping
 from typing import Any, ClassVar, TypeVar
-from xml.etree.ElementTree import Element
 
 from ...model.subcycling import check_tolerance
-from ..description import Flavour, model_description
-from ..variable import SAME_TIME, Phase, Variable, may_be_set
+from ..variable import SAME_TIME, Model, Phase, Variable, may_be_set
 from .wrapper import WrappedSlave, called_by_wrapper
 
 DIGEST_SIZE = 64
@@ -27,13 +25,13 @@ class Slave(WrappedSlave):
 
     build: ClassVar[str] = ""
     """A digest of all that is in the FMU; the entry script of an FMU sets it."""
-    flavour: ClassVar[Flavour]
+    model: ClassVar[Model]
     on_demand: ClassVar[frozenset[int]] = frozenset()
     """References of the Reals that are worked out when they are asked for."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        model = self.flavour.model
+        model = self.model
         self._by_reference, self._inputs, self._kept = model.by_reference, model.inputs, model.kept
         self._phase = Phase.INSTANTIATED
         self._reals: dict[int, float] = {}
@@ -252,12 +250,6 @@ class Slave(WrappedSlave):
     def _check_build(cls, state: dict[str, Any]) -> None:
         if state["build"] != cls.build:
             raise ValueError(f"FMU state of build {state['build']}: must be a state of this build, {cls.build}")
-
-    # ---- description
-
-    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
-        """The model description, made from the table of variables."""
-        return model_description(self.build, self.flavour)
 
     # ---- what is the model's own
 

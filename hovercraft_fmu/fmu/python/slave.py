@@ -15,13 +15,13 @@ from ...model.subcycling import (
     check_tolerance,
     stability_number,
 )
-from ..description import PYTHON
 from ..interface import (
     ACTION,
     BY_NAME,
     COUNTER_STOPPED,
     CRAFT_PARAMETERS,
     HELD,
+    HOVERCRAFT,
     INPUT_HELD,
     INPUTS,
     MOTION,
@@ -52,7 +52,7 @@ PROJECTED_AREA = BY_NAME["projected_area"].reference
 class HovercraftSlave(Slave):
     """The hovercraft behind the FMI functions of pythonfmu's wrapper."""
 
-    flavour = PYTHON
+    model = HOVERCRAFT
     on_demand = frozenset(ACTION_REFERENCES)
 
     def __init__(self, **kwargs: Any) -> None:
