@@ -159,10 +159,10 @@ class HovercraftSlave(Slave):
         elif variable.reference == TOLERANCE:
             check_tolerance(value)
         elif variable.chooses:
-            self.flavour.model.check_choice(variable.chooses, int(value))
+            self.model.check_choice(variable.chooses, int(value))
 
     def _chosen(self, enumeration: str) -> int:
-        model = self.flavour.model
+        model = self.model
         item, number = (self._integers[v.reference] for v in (model.by_name[enumeration], model.choices[enumeration]))
         return model.chosen(enumeration, item, number)
 
