@@ -1,8 +1,9 @@
 """A hovercraft as an FMU: build it, run it."""
 
 from ._version import __version__
+from .building import build
 from .fmu.python_package import build_fmu
 from .host import SimulationError
 from .simulation import Result, simulate
 
-__all__ = ["Result", "SimulationError", "__version__", "build_fmu", "simulate"]
+__all__ = ["Result", "SimulationError", "__version__", "build", "build_fmu", "simulate"]

@@ -25,16 +25,15 @@ from rich.table import Table
 from rich.text import Text
 
 from ._version import __version__
-from .autopilot.pilot_package import AUTOPILOT, build_autopilot
+from .autopilot.pilot_package import build_autopilot
+from .building import FOLDER, PRODUCTS, Product, product
 from .coupling import Passage, sail
-from .fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
-from .fmu.native_package import build_native_fmu, has_compiler
+from .fmu.machine_code import NotCompiledError
 from .fmu.python_package import build_fmu
 from .host import SimulationError
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES, VOYAGES
 from .simulation import DEFAULT_FMU, Inputs, Result, default_fmu, plan, simulate
-from .ssp import build_ssp
 from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE
 from .view.tables import markdown
@@ -69,7 +68,7 @@ def commands(context: click.Context) -> None:
     New here?
       hovercraft-fmu demo                          build, check and drive it; see build/demo/
       hovercraft-fmu demo --loop                   the same with an autopilot at the helm
-      hovercraft-fmu build                         write build/Hovercraft.fmu and build/HovercraftNative.fmu
+      hovercraft-fmu build                         write the FMUs and the SSP files into build/
       hovercraft-fmu drive                         the arrow keys, in a window
       hovercraft-fmu simulate --scene turn --plot turn.png
       hovercraft-fmu simulate --help               what can be set
@@ -78,42 +77,29 @@ def commands(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-@commands.command()
-@click.option("--native", is_flag=True, help="The native FMU alone.")
-@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="With --native: FMI 2.0 (the default) or 3.0.")
-@click.option("--ssp", is_flag=True, help="Then the autopilot's FMU, and an SSP file of the closed loop with each FMU.")
-def build(native: bool, fmi: str, ssp: bool) -> None:
-    """Write build/Hovercraft.fmu and, where its compiler is installed, build/HovercraftNative.fmu.
+@commands.command("build")
+@click.argument("kinds", nargs=-1, metavar="[KIND ...]")
+@click.option(
+    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", default=FOLDER, show_default=True
+)
+def build_command(kinds: tuple[str, ...], output: Path) -> None:
+    """Write the FMUs and the SSP files of the closed loop.
 
-    With --native --fmi 3: build/HovercraftNative3.fmu. The compiler of the native FMUs: pip install
-    'hovercraft-fmu[native]'.
+    KIND is native, native3, python, autopilot, native_loop or python_loop; without it all are written.
     """
-    if fmi == "3" and not native:
-        raise click.UsageError("--fmi 3: must be given with --native; the Python FMU is FMI 2.0")
-    if fmi == "3" and ssp:
-        raise click.UsageError("--ssp: must not be given with --fmi 3; the loop is of FMI 2.0")
-    built = []
-    if not native:
-        built.append(build_fmu())
-        _print_built(built[-1], PYTHON, "Python")
-    if native or has_compiler():
-        flavour = NATIVE3 if fmi == "3" else NATIVE
-        built.append(build_native_fmu(flavour=flavour))
-        _print_built(built[-1], flavour, "native")
-    else:
-        OUTPUT.print("no native FMU: its compiler is not installed: pip install 'hovercraft-fmu\\[native]'")
-    if ssp:
-        autopilot = build_autopilot()
-        _print_built(autopilot, AUTOPILOT, "Python")
-        for fmu in built:
-            path = build_ssp(fmu.with_name(f"{fmu.stem}Loop.ssp"), fmu, autopilot)
-            OUTPUT.print(
-                f"{path}: {path.stat().st_size / 1000:.0f} kB, SSP 1.0, the loop of {fmu.name} and {autopilot.name}"
-            )
+    wanted = [product(kind) for kind in kinds] or list(PRODUCTS.values())
+    if problems := [problem for each in wanted if (problem := _written(each, output / each.name))]:
+        raise click.ClickException("; ".join(problems))
 
 
-def _print_built(path: Path, flavour: Flavour, language: str) -> None:
-    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, FMI {flavour.fmi}.0, {language}")
+def _written(chosen: Product, path: Path) -> str:
+    """Write a file and say what it is for; returns why it was not written where its machine code is missing."""
+    try:
+        chosen.write(path)
+    except NotCompiledError as error:
+        return f"{chosen.name} was not written: {error}"
+    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, {chosen.purpose}", markup=False)
+    return ""
 
 
 @commands.command("simulate")

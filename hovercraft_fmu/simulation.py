@@ -456,8 +456,7 @@ def loaded(
     """
     path = Path(fmu)
     if not path.is_file():
-        command = "build" if model == HOVERCRAFT.name else "build --ssp"
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu {command}' writes build/{model}.fmu")
+        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{model}.fmu")
     description = read_description(path, model=model, versions=versions)
     with instantiated(path, description, messages) as (folder, instance):
         yield folder, instance, description

@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,7 +14,8 @@ from hypothesis import settings
 from hovercraft_fmu import build_fmu
 from hovercraft_fmu.autopilot.pilot_package import build_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
-from hovercraft_fmu.fmu.native_package import build_native_fmu, has_compiler
+from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all
+from hovercraft_fmu.fmu.native_package import build_native_fmu
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -52,14 +53,20 @@ def _native(flavour: Flavour, variable: str, built: Built) -> Path:
     """A native FMU of this tree, or the one that an environment variable names (a sanitized one, for example)."""
     if given := os.environ.get(variable):
         return Path(given)
-    _compiler_or_skip()
-    platforms = HERE[sys.platform]
-    return built(f"{flavour.identifier}.fmu", lambda path: build_native_fmu(path, flavour, platforms))
+    return _compiled(flavour, f"{flavour.identifier}.fmu", built, HERE[sys.platform])
 
 
-def _compiler_or_skip() -> None:
-    if not has_compiler():
-        pytest.skip("no ziglang: pip install 'hovercraft-fmu[native]'")
+def _compiled(flavour: Flavour, name: str, built: Built, platforms: Iterable[str]) -> Path:
+    """A native FMU; C that was changed since it was compiled is compiled again, where the compiler is installed."""
+
+    def make(path: Path) -> Path:
+        compile_all(platforms)
+        return build_native_fmu(path, flavour, platforms)
+
+    try:
+        return built(name, make)
+    except NotCompiledError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="session")
@@ -77,9 +84,8 @@ def native3_fmu(built: Built) -> Path:
 @pytest.fixture(scope="session")
 def complete_native_fmu(standard: int, built: Built) -> Path:
     """The native FMU of FMI 2.0, then that of FMI 3.0, for every platform."""
-    _compiler_or_skip()
     flavour = NATIVE if standard == 2 else NATIVE3
-    return built(f"{flavour.identifier}Complete.fmu", lambda path: build_native_fmu(path, flavour))
+    return _compiled(flavour, f"{flavour.identifier}Complete.fmu", built, PLATFORMS)
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ import pytest
 
 from hovercraft_fmu import hosts
 from hovercraft_fmu.fmu.description import NATIVE, Flavour
-from hovercraft_fmu.fmu.native_package import C_FOLDER, OPTIONS, sources
+from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, sources
 from hovercraft_fmu.hosts import compiler
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State

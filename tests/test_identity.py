@@ -13,9 +13,10 @@ import fmpy
 import pytest
 
 from hovercraft_fmu import build_fmu
-from hovercraft_fmu.fmu import document, native_package, python_package
+from hovercraft_fmu.fmu import document, machine_code, python_package
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
-from hovercraft_fmu.fmu.native_package import build_native_fmu, native_build
+from hovercraft_fmu.fmu.machine_code import identity
+from hovercraft_fmu.fmu.native_package import build_native_fmu
 from tests.conftest import HERE
 from tests.lowlevel import everything, one, put, start
 
@@ -70,15 +71,15 @@ def test_with_another_constant_in_the_model_it_is_another_python_fmu(fmu: Path, 
 
 @pytest.mark.parametrize("flavour", [NATIVE, NATIVE3], ids=lambda flavour: flavour.identifier)
 def test_with_another_constant_in_the_kernel_it_is_another_native_fmu(flavour: Flavour, copied: Copied) -> None:
-    before = native_build(flavour)
-    change(copied(native_package, "C_FOLDER") / "kernel.c", "0.5 * craft->air_density", "0.25 * craft->air_density")
-    assert native_build(flavour) != before
+    before = identity(flavour)
+    change(copied(machine_code, "C_FOLDER") / "kernel.c", "0.5 * craft->air_density", "0.25 * craft->air_density")
+    assert identity(flavour) != before
 
 
 @pytest.mark.parametrize("flavour", [NATIVE, NATIVE3], ids=lambda flavour: flavour.identifier)
 def test_with_another_option_of_the_compiler_it_is_another_native_fmu(
     flavour: Flavour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = native_build(flavour)
-    monkeypatch.setattr(native_package, "OPTIONS", (*native_package.OPTIONS, "-O3"))
-    assert native_build(flavour) != before
+    before = identity(flavour)
+    monkeypatch.setattr(machine_code, "OPTIONS", (*machine_code.OPTIONS, "-O3"))
+    assert identity(flavour) != before

@@ -135,7 +135,7 @@ def test_what_cannot_be_is_refused(fmu: Path, native3_fmu: Path, autopilot: Path
     with pytest.raises(ValueError, match=r"HovercraftNative3\.fmu: must be an FMU for co-simulation, FMI 2\.0"):
         sail("calm", native3_fmu, autopilot)
     with pytest.raises(
-        FileNotFoundError, match=r"nix\.fmu: no such FMU; 'hovercraft-fmu build --ssp' writes build/Autopilot"
+        FileNotFoundError, match=r"nix\.fmu: no such FMU; 'hovercraft-fmu build' writes build/Autopilot"
     ):
         sail("calm", fmu, tmp_path / "nix.fmu")
     with pytest.raises(SimulationError, match=r"mass = -1.0: must be greater than 0"):

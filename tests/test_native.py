@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STEP_UNSTABLE
-from hovercraft_fmu.fmu.native_package import library
+from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.hosts import hosts_of, run_in
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, read_description, run_fmu, run_model
@@ -473,7 +473,7 @@ def loaded(native_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
         pytest.skip("not x86-64 Linux")
     folder = tmp_path_factory.mktemp("library")
     extract(str(native_fmu), unzipdir=str(folder))
-    found = CDLL(str(folder / "binaries" / library("x86_64-linux", NATIVE)))
+    found = CDLL(str(folder / "binaries" / binary("x86_64-linux", NATIVE)))
     found.fmi2Instantiate.restype = c_void_p
     return found
 
@@ -606,7 +606,7 @@ def sanitized(fmu: Path, flavour: Flavour, folder: Path) -> Path:
             (folder / Path(name).name).write_bytes(content)
     command = [c_compiler(), "-std=c11", "-O1", "-ffp-contract=off", *SANITIZERS["address"], "-shared", "-fPIC"]
     subprocess.run([*command, *flavour.sources, "-lm", "-o", "x.so"], cwd=folder, check=True)
-    files[f"binaries/{library('x86_64-linux', flavour)}"] = (folder / "x.so").read_bytes()
+    files[f"binaries/{binary('x86_64-linux', flavour)}"] = (folder / "x.so").read_bytes()
     path = folder / "Sanitized.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in files.items():
@@ -656,7 +656,7 @@ libc.calloc.restype = ctypes.c_void_p
 print(library.fmi2SetFMUstate(made, ctypes.c_void_p(libc.calloc(1, 16))))
 """
     extract(str(sanitized_fmus[0]), unzipdir=str(tmp_path))
-    found = tmp_path / "binaries" / library("x86_64-linux", NATIVE)
+    found = tmp_path / "binaries" / binary("x86_64-linux", NATIVE)
     runtime = subprocess.run([c_compiler(), "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
     env = {**os.environ, "LD_PRELOAD": runtime.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
     command = [sys.executable, "-c", code, str(found), str(read_description(sanitized_fmus[0]).guid)]

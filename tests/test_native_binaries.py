@@ -1,26 +1,19 @@
 """The native FMU as a file: what is inside, what its libraries need, and that two builds give the same bytes."""
 
-import hashlib
 import io
 import re
 import subprocess
-import sys
 import zipfile
-from functools import partial
 from pathlib import Path
 
 import fmpy
 import pytest
-from click.testing import CliRunner
 from lxml import etree
 
-from hovercraft_fmu import cli
-from hovercraft_fmu.fmu import native_package
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import BY_NAME
-from hovercraft_fmu.fmu.native_package import library
+from hovercraft_fmu.fmu.native_package import binary
 from tests.binaries import CPU_ARM64, CPU_X86_64, dll, dylib, elf, is_ad_hoc_signed, slices
-from tests.conftest import HERE, Fresh
 from tests.native import c_compiler
 
 pytestmark = pytest.mark.once
@@ -64,7 +57,7 @@ def test_what_is_inside(archive: dict[str, bytes], flavour: Flavour) -> None:
     folders = {
         2: {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"},
         3: {"x86_64-linux": ".so", "x86_64-windows": ".dll", "x86_64-darwin": ".dylib"},
-    }[flavour.fmi] | {"aarch64-linux": ".so", "aarch64-darwin": ".dylib"}
+    }[flavour.fmi] | {"aarch64-linux": ".so", "aarch64-darwin": ".dylib", "aarch64-windows": ".dll"}
     expected = {f"binaries/{folder}/{flavour.identifier}{suffix}" for folder, suffix in folders.items()}
     assert {name for name in archive if name.startswith("binaries/")} == expected
     assert not [name for name in archive if name.endswith(".py") or name.startswith("resources/")]
@@ -113,7 +106,7 @@ def test_the_description_names_all_sources(archive: dict[str, bytes], flavour: F
 @pytest.mark.parametrize(("platform", "machine"), [("x86_64-linux", 62), ("aarch64-linux", 183)])
 def test_libraries_of_linux(platform: str, machine: int, archive: dict[str, bytes], flavour: Flavour) -> None:
     """glibc of 2012 is enough; no Python, no libm."""
-    found = elf(archive[f"binaries/{library(platform, flavour)}"])
+    found = elf(archive[f"binaries/{binary(platform, flavour)}"])
     assert found.machine == machine
     assert found.exports == functions(flavour)
     assert found.undefined <= OF_LIBC
@@ -121,17 +114,19 @@ def test_libraries_of_linux(platform: str, machine: int, archive: dict[str, byte
     assert (0, 0) < found.glibc <= (2, 17)
 
 
-def test_the_library_of_windows(archive: dict[str, bytes], flavour: Flavour) -> None:
-    found = dll(archive[f"binaries/{library('x86_64-windows', flavour)}"])
-    assert found.machine == 0x8664
+@pytest.mark.parametrize(("platform", "machine"), [("x86_64-windows", 0x8664), ("aarch64-windows", 0xAA64)])
+def test_the_libraries_of_windows(platform: str, machine: int, archive: dict[str, bytes], flavour: Flavour) -> None:
+    """That of arm64 is checked as a file alone."""
+    found = dll(archive[f"binaries/{binary(platform, flavour)}"])
+    assert found.machine == machine
     assert found.exports == functions(flavour)
     assert found.needed == {"KERNEL32.dll"}
 
 
 def test_the_libraries_of_macos(archive: dict[str, bytes], flavour: Flavour) -> None:
     """FMI 2.0 has both in one file."""
-    arm = archive[f"binaries/{library('aarch64-darwin', flavour)}"]
-    intel = archive[f"binaries/{library('x86_64-darwin', flavour)}"]
+    arm = archive[f"binaries/{binary('aarch64-darwin', flavour)}"]
+    intel = archive[f"binaries/{binary('x86_64-darwin', flavour)}"]
     parts = slices(intel) if flavour.fmi == 2 else [intel, arm]
     assert [dylib(part).cpu for part in parts] == [CPU_X86_64, CPU_ARM64]
     assert parts[1] == arm
@@ -189,63 +184,3 @@ def test_nothing_is_shared_between_instances_or_with_other_libraries(sources: Pa
     assert re.findall(r"^[0-9a-f]+ [bBdDcC] .*$", printed, re.MULTILINE) == []
     prefixes = rf"fmi{flavour.fmi}|kernel_|instance_|logarithm_|memory_|text_|trig_"
     assert re.findall(rf" T (?!{prefixes})\w+", printed) == []
-
-
-def test_the_same_bytes_elsewhere(complete_native_fmu: Path, flavour: Flavour, fresh: Fresh, tmp_path: Path) -> None:
-    """In another folder, with empty caches."""
-    code = f"""
-import os; os.umask(0o077)
-from hovercraft_fmu.fmu.description import NATIVE, NATIVE3
-from hovercraft_fmu.fmu.native_package import build_native_fmu
-print(build_native_fmu(flavour={"NATIVE" if flavour is NATIVE else "NATIVE3"}))
-"""
-    caches = {"ZIG_GLOBAL_CACHE_DIR": str(tmp_path / "global"), "ZIG_LOCAL_CACHE_DIR": str(tmp_path / "local")}
-    printed = fresh(code, env={**caches, "TZ": "Pacific/Auckland"})
-    made = tmp_path / "build" / f"{flavour.identifier}.fmu"
-    assert printed.strip() == made.relative_to(tmp_path).as_posix()
-    digests = [hashlib.sha256(each.read_bytes()).hexdigest() for each in (made, complete_native_fmu)]
-    assert digests[0] == digests[1]
-    assert list(made.parent.iterdir()) == [made]
-
-
-def test_without_the_compiler_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(native_package, "has_compiler", lambda: False)
-    with pytest.raises(ModuleNotFoundError, match=re.escape("pip install 'hovercraft-fmu[native]'")):
-        native_package.build_native_fmu(tmp_path / "X.fmu")
-
-
-@pytest.fixture
-def for_this_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The command, in an empty folder, compiles for one platform alone: five take long."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli, "build_native_fmu", partial(native_package.build_native_fmu, platforms=HERE[sys.platform]))
-
-
-@pytest.mark.usefixtures("for_this_machine")
-def test_the_command_builds_both_or_says_why_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    python, native = Path("build/Hovercraft.fmu"), Path(f"build/{NATIVE.identifier}.fmu")
-    done = CliRunner().invoke(cli.commands, ["build", "--native"])
-    assert (done.exit_code, python.exists(), native.exists()) == (0, False, True)
-    assert done.stdout.startswith(f"{native}: ")
-    native.unlink()
-    monkeypatch.setattr(cli, "has_compiler", lambda: False)
-    done = CliRunner().invoke(cli.commands, ["build"])
-    assert (done.exit_code, python.exists(), native.exists()) == (0, True, False)
-    assert "no native FMU: its compiler is not installed: pip install 'hovercraft-fmu[native]'" in done.stdout
-
-
-def test_a_compiler_that_fails_is_heard(tmp_path: Path) -> None:
-    (tmp_path / "fmi2.c").write_text("#error on purpose\n")
-    with pytest.raises(OSError, match=r"compiling for x86_64-linux-gnu\.2\.17 failed: .*on purpose"):
-        native_package.compiled(tmp_path, native_package.PLATFORMS["x86_64-linux"])
-
-
-@pytest.mark.usefixtures("for_this_machine")
-def test_the_command_builds_fmi_3_where_it_is_asked() -> None:
-    three = Path(f"build/{NATIVE3.identifier}.fmu")
-    done = CliRunner().invoke(cli.commands, ["build", "--native", "--fmi", "3"])
-    assert (done.exit_code, list(Path("build").iterdir())) == (0, [three])
-    assert re.fullmatch(rf"{three}: \d+ kB, FMI 3.0, native\n", done.stdout)
-    done = CliRunner().invoke(cli.commands, ["build", "--fmi", "3"])
-    assert done.exit_code != 0
-    assert "--fmi 3: must be given with --native; the Python FMU is FMI 2.0" in done.output

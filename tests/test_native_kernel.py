@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hovercraft_fmu.fmu.native_package import C_FOLDER
+from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, drag_per_speed, loads, saturate
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, Stretch

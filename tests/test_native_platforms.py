@@ -14,8 +14,9 @@ import pytest
 
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, MOTION, STATES
+from hovercraft_fmu.fmu.machine_code import OPTIONS, PLATFORMS, caches, compiler
 from hovercraft_fmu.fmu.native_header import constant
-from hovercraft_fmu.fmu.native_package import OPTIONS, PLATFORMS, compiler, library
+from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Run, plan, schedule
 from tests.lowlevel import one
@@ -87,13 +88,14 @@ def unpacked(complete_native_fmu: Path, standard: int, tmp_path_factory: pytest.
 
 def hashes(unpacked: Unpacked, platform: str, *runner: str, env: Elsewhere | None = None) -> dict[str, str]:
     """What the host in C prints on a platform: run -> hash."""
-    path = unpacked.folder / "binaries" / library(platform, unpacked.flavour)
+    path = unpacked.folder / "binaries" / binary(platform, unpacked.flavour)
     target = PLATFORMS[platform]
     program = "trajectory.exe" if target.suffix == ".dll" else "trajectory"
     options = ["-nostdlib", "-Wl,--entry=start", "-lkernel32"] if target.suffix == ".dll" else ["-ldl"]
     command = [*compiler(target), f'-DLIBRARY="./{path.name}"', *unpacked.options, str(C_TESTS / "trajectory.c"),
                *options, "-o", program]  # fmt: skip
-    done = subprocess.run(command, cwd=path.parent, capture_output=True, text=True, check=False)
+    cache = {**os.environ, **caches(unpacked.folder / "cache")}
+    done = subprocess.run(command, cwd=path.parent, env=cache, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     done = subprocess.run(
         [*runner, f"./{program}"], cwd=path.parent, env={**os.environ, **(env or {})}, capture_output=True, text=True,
@@ -165,7 +167,7 @@ def host(unpacked: Unpacked, name: str, *options: str, linked: bool) -> Path:
     if sys.platform != "linux":
         pytest.skip("not Linux")
     program = unpacked.folder / f"{name}{''.join(options)}"
-    path = unpacked.folder / "binaries" / library("x86_64-linux", unpacked.flavour)
+    path = unpacked.folder / "binaries" / binary("x86_64-linux", unpacked.flavour)
     parts = (
         [str(path), f"-Wl,-rpath,{path.parent}"]
         if linked

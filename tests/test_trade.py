@@ -10,7 +10,8 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from hovercraft_fmu.cli import commands
-from hovercraft_fmu.fmu.native_package import has_compiler
+from hovercraft_fmu.fmu.description import NATIVE
+from hovercraft_fmu.fmu.machine_code import library
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.scenes import SCENES, Scene
 from hovercraft_fmu.simulation import schedule
@@ -101,7 +102,7 @@ def test_the_command(tmp_path: Path) -> None:
         assert {f"{method.name}: a sub-step" for method in INTEGRATORS} <= {row["what"] for row in costs}
         plain = [row["what"] for row in costs if row["compared_with"].startswith("plain C loop")]
         assert plain == ["semi_implicit_euler: a sub-step", "adaptive: a sub-step"]
-    if has_compiler():
+    if not library(NATIVE).missing:
         chosen, runs, before = (
             records(folder / name)
             for folder, name in (

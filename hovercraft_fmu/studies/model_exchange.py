@@ -15,9 +15,12 @@ import numpy as np
 from fmpy import fmi2
 from rich.console import Group
 from rich.table import Table
+from rich.text import Text
 
+from ..fmu.description import NATIVE
 from ..fmu.interface import BY_NAME, INPUTS, STATES, VARIABLES
-from ..fmu.native_package import build_native_fmu, has_compiler
+from ..fmu.machine_code import library
+from ..fmu.native_package import build_native_fmu
 from ..host import SimulationError
 from ..model.dynamics import Controls, State
 from ..scenes import SCENES, Row, Scene
@@ -309,8 +312,8 @@ TITLES = (
 
 def run(folder: Path, quick: bool = False) -> Group:
     """Measure, write exchange_runs.csv and exchange.csv into the folder, and return what is to be printed."""
-    if not has_compiler():
-        return Group("\nModel exchange was not measured: no compiler: pip install 'hovercraft-fmu[native]'")
+    if reason := library(NATIVE).missing:
+        return Group(Text(f"\nModel exchange was not measured: {reason}"))
     runs = measure(quick)
     chosen = choices(runs)
     folder.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,8 @@ from rich.console import Group
 
 from ..fmu.description import NATIVE
 from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
-from ..fmu.native_package import build_native_fmu, has_compiler, sources
+from ..fmu.machine_code import library, sources
+from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..hosts import compiler, python_library
 from ..model.integrators import INTEGRATORS
@@ -50,8 +51,8 @@ def missing() -> str:
     """Why it cannot be measured here; '' where it can."""
     if sys.platform != "linux" or not compiler():
         return "no C compiler (cc, gcc, clang) on Linux"
-    if not has_compiler():
-        return "no compiler of the native FMU: pip install 'hovercraft-fmu[native]'"
+    if reason := library(NATIVE).missing:
+        return reason
     return "" if python_library() else "no shared library of Python (Debian: apt-get install libpython3-dev)"
 
 

@@ -1,0 +1,48 @@
+"""The build hook: machine code of the native FMUs, compiled when a wheel is made or a checkout is installed."""
+
+import os
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from packaging.tags import sys_tags
+
+HAVE_COMPILER = {
+    "macosx_13_0_arm64",
+    "macosx_13_0_x86_64",
+    *(f"manylinux_2_12_{machine}" for machine in ("i686", "x86_64")),
+    *(f"manylinux_2_17_{machine}" for machine in ("aarch64", "armv7l", "ppc64le", "s390x")),
+    "manylinux_2_31_riscv64",
+    *(f"musllinux_1_1_{machine}" for machine in ("aarch64", "armv7l", "i686", "ppc64le", "riscv64", "s390x", "x86_64")),
+    *("win32", "win_amd64", "win_arm64"),
+}
+"""Platforms for which the compiler's package has a wheel."""
+
+
+class MachineCodeHook(BuildHookInterface):  # type: ignore[type-arg, misc, unused-ignore]  # there may be no hatchling
+    """Where the compiler is left out or fails the install succeeds, and the package says what is missing."""
+
+    PLUGIN_NAME = "custom"
+
+    def dependencies(self) -> list[str]:
+        """The compiler, where it can be had and is needed."""
+        code = _machine_code(self.root)
+        if os.environ.get(code.LEAVE_OUT) or not any(each.missing for each in code.libraries()):
+            return []
+        return ["==".join(code.COMPILER)] if any(tag.platform in HAVE_COMPILER for tag in sys_tags()) else []
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002 - hatchling's
+        """Compile."""
+        if reason := _machine_code(self.root).compile_all():
+            self.app.display_warning(f"no machine code of the native FMUs: {reason}")
+
+
+def _machine_code(root: str) -> Any:
+    """The module of the package, without what the package itself imports: nothing of that is installed yet."""
+    package = ModuleType("hovercraft_fmu")
+    package.__path__ = [str(Path(root) / "hovercraft_fmu")]
+    sys.modules["hovercraft_fmu"] = package
+    return import_module("hovercraft_fmu.fmu.machine_code")

@@ -1,0 +1,96 @@
+"""What this package makes: a table of files, and one function that writes any of them."""
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
+from typing import Literal, NamedTuple, TypeAlias, get_args
+
+from .autopilot.pilot_package import build_autopilot
+from .fmu.description import NATIVE, NATIVE3
+from .fmu.native_package import build_native_fmu
+from .fmu.python_package import build_fmu
+from .ssp import build_ssp
+
+Kind: TypeAlias = Literal["native", "native3", "python", "autopilot", "native_loop", "python_loop"]
+FOLDER = Path("build")
+
+
+class Product(NamedTuple):
+    """A file."""
+
+    name: str
+    purpose: str
+    """What it is for."""
+    write: Callable[[Path], Path]
+
+
+def _write_loop(kind: Kind) -> Callable[[Path], Path]:
+    def write(path: Path) -> Path:
+        with TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
+            craft, autopilot = (build(each, Path(folder) / PRODUCTS[each].name) for each in (kind, "autopilot"))
+            return build_ssp(path, craft, autopilot)
+
+    return write
+
+
+PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
+    {
+        "native": Product(
+            "HovercraftNative.fmu",
+            "FMI 2.0, machine code: for every tool; needs nothing",
+            lambda path: build_native_fmu(path, NATIVE),
+        ),
+        "native3": Product(
+            "HovercraftNative3.fmu",
+            "FMI 3.0, machine code: for tools that want FMI 3.0, and for arm64 Linux in fmpy",
+            lambda path: build_native_fmu(path, NATIVE3),
+        ),
+        "python": Product(
+            "Hovercraft.fmu",
+            "FMI 2.0, Python: to read or change the model; needs Python 3.10 or newer where it runs",
+            build_fmu,
+        ),
+        "autopilot": Product(
+            "Autopilot.fmu",
+            "FMI 2.0, Python: takes the craft from waypoint to waypoint",
+            build_autopilot,
+        ),
+        "native_loop": Product(
+            "HovercraftNativeLoop.ssp",
+            "SSP 1.0: the closed loop of HovercraftNative.fmu and Autopilot.fmu, for co-simulation masters",
+            _write_loop("native"),
+        ),
+        "python_loop": Product(
+            "HovercraftLoop.ssp",
+            "SSP 1.0: the same loop with Hovercraft.fmu",
+            _write_loop("python"),
+        ),
+    }
+)
+assert tuple(PRODUCTS) == get_args(Kind)
+
+
+def build(kind: Kind = "native", path: str | os.PathLike[str] | None = None) -> Path:
+    """Write a file of that kind to `path` (its folder is made) and return the path; two builds give the same bytes.
+
+    Args:
+        kind: what: the key of a row of PRODUCTS.
+        path: the file; without it that of PRODUCTS, in build/.
+
+    Raises:
+        ValueError: no such kind, or the name does not end in .fmu (.ssp for a loop).
+        NotCompiledError: there is no machine code for a native one; the message says how to get it.
+        OSError: the file cannot be written; one that stood there before still does.
+    """
+    chosen = product(kind)
+    return chosen.write(Path(path or FOLDER / chosen.name))
+
+
+def product(kind: str) -> Product:
+    """The row of PRODUCTS. Raises ValueError: no such kind."""
+    for known, row in PRODUCTS.items():
+        if kind == known:
+            return row
+    raise ValueError(f"kind = {kind!r}: must be one of {', '.join(PRODUCTS)}")

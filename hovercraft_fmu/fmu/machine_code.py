@@ -1,0 +1,249 @@
+"""The machine code: the C of native/ compiled for six platforms on one machine, the same bytes wherever that is done.
+
+The build hook (hatch_build.py) does it when the package is built, before anything else is installed: this module needs
+the standard library alone. What was compiled lies in compiled/, in folders that carry a digest of all that it was made
+of, so C that was changed since finds no folder, and stale machine code is never run.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import metadata, resources
+from pathlib import Path
+
+from .archive import digest
+from .description import NATIVE, NATIVE3, Flavour, model_description, xml
+from .native_header import variables_header
+
+COMPILER = ("ziglang", "0.17.1")
+"""The package that brings the C compiler; it makes the bytes, so the version is fixed."""
+LEAVE_OUT = "HOVERCRAFT_FMU_NO_COMPILER"
+"""The environment variable that keeps the build hook from asking for the compiler."""
+C_FOLDER = Path(__file__).parent / "native"
+COMPILED = Path(__file__).parent / "compiled"
+WHY_NOT = "why_not.txt"
+"""In COMPILED: why the last attempt failed, for those who did not see it."""
+OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
+"""What keeps the bits, and keeps libm out."""
+LIBRARY_OPTIONS = ("-g0", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-slp-vectorize")
+"""A sub-step is one chain of operations: packing pairs of them into vectors costs a tenth of its time."""
+TIME_LIMIT = 600.0
+"""s, of one compilation: most take three."""
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A target of the compiler, and the file that it becomes in binaries/."""
+
+    target: str
+    suffix: str
+    options: tuple[str, ...]
+
+
+# Without the compiler's own runtime, which would take most of the time and of which nothing is needed; the C library is
+# named, so that a loader finds it. glibc of 2012; macOS of 2020. What strips a Mach-O file would break its signature.
+_OF_LINUX = ("-s", "-nostdlib", "-lc")
+_OF_MACOS = ("-nostdlib", "-lSystem")
+# without a C runtime: nothing to install
+_OF_WINDOWS = ("-s", "-nostdlib", "-Wl,--entry=DllMain", "-DHOVERCRAFT_NO_LIBC", "-lkernel32")
+PLATFORMS: Mapping[str, Platform] = {
+    "x86_64-linux": Platform("x86_64-linux-gnu.2.17", ".so", _OF_LINUX),
+    "aarch64-linux": Platform("aarch64-linux-gnu.2.17", ".so", _OF_LINUX),
+    "x86_64-windows": Platform("x86_64-windows-gnu", ".dll", _OF_WINDOWS),
+    "aarch64-windows": Platform("aarch64-windows-gnu", ".dll", _OF_WINDOWS),
+    "x86_64-darwin": Platform("x86_64-macos.11.0", ".dylib", _OF_MACOS),
+    "aarch64-darwin": Platform("aarch64-macos.11.0", ".dylib", _OF_MACOS),
+}
+"""By the names of FMI 3.0."""
+
+
+class NotCompiledError(FileNotFoundError):
+    """There is no machine code of the C that is here; the message says how to get it."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """What is compiled into one library for each platform."""
+
+    name: str
+    sources: tuple[str, ...]
+    """The files to compile."""
+    files: Mapping[str, bytes] = field(repr=False)
+    """All that the compiler reads, by name: these and what they include."""
+
+    @cached_property
+    def folder(self) -> Path:
+        """Where its machine code is, in a folder for each platform."""
+        return COMPILED / f"{self.name}-{digest({**self.files, **_made_by(self.sources)})[:16]}"
+
+    @property
+    def missing(self) -> str:
+        """Why there is no machine code of it, and how to get it; '' where there is."""
+        return self._missing if any(not self.file(platform).exists() for platform in PLATFORMS) else ""
+
+    @property
+    def _missing(self) -> str:
+        return f"no machine code of {self.name}: {why_not()}; {HOW}"
+
+    def path(self, platform: str) -> Path:
+        """Of the library for a platform. Raises NotCompiledError."""
+        path = self.file(platform)
+        if not path.exists():
+            raise NotCompiledError(self._missing)
+        return path
+
+    def file(self, platform: str) -> Path:
+        """Where the library for a platform is, once it is compiled."""
+        return self.folder / platform / f"{self.name}{PLATFORMS[platform].suffix}"
+
+
+def libraries() -> list[Library]:
+    """All that are compiled."""
+    return [library(NATIVE), library(NATIVE3)]
+
+
+def library(flavour: Flavour) -> Library:
+    """Of a native FMU."""
+    return Library(flavour.identifier, flavour.sources, sources(identity(flavour), flavour))
+
+
+def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
+    """All that a C compiler needs, by name; `build` is a hexadecimal digest of 32 digits."""
+    ours = [C_FOLDER / name for name in flavour.sources] + sorted(C_FOLDER.glob("*.h"))
+    headers = sorted((C_FOLDER / f"fmi{flavour.fmi}").glob("*.h"))
+    return {**{file.name: file.read_bytes() for file in (*ours, *headers)}, "variables.h": _header(build)}
+
+
+def _header(build: str) -> bytes:
+    return variables_header(build).encode()
+
+
+def identity(flavour: Flavour) -> str:
+    """What the FMU is: a digest of code, table, compiler and options, but of nothing that is written about it."""
+    table = xml(model_description("0" * 32, flavour))
+    return digest({**sources("0" * 32, flavour), **_made_by(flavour.sources), "table": table})
+
+
+def _made_by(compiled: Sequence[str]) -> dict[str, bytes]:
+    return {"compiler": f"{COMPILER} {OPTIONS} {LIBRARY_OPTIONS} {PLATFORMS} {compiled}".encode()}
+
+
+# ---- where there is none
+
+
+HOW = (
+    "compile it: pip install -e . (which brings the compiler)"
+    if (Path(__file__).parents[2] / "hatch_build.py").exists()
+    else "install a wheel that has it: pip install --force-reinstall --only-binary :all: hovercraft-fmu"
+)
+
+
+def why_not() -> str:
+    """Why there is no machine code of the C that is here."""
+    try:
+        return (COMPILED / WHY_NOT).read_text(encoding="utf-8")
+    except OSError:
+        return "it was never compiled, or the C was changed since"
+
+
+# ---- compiling
+
+
+def compile_all(platforms: Iterable[str] | None = None) -> str:
+    """Compile what is not compiled yet, and forget what is stale.
+
+    Args:
+        platforms: keys of PLATFORMS; without them all.
+
+    Returns:
+        Why that failed; '' where it did not.
+    """
+    wanted = libraries()
+    COMPILED.mkdir(exist_ok=True)
+    try:
+        _compile(wanted, PLATFORMS if platforms is None else platforms)
+        reason = ""
+        (COMPILED / WHY_NOT).unlink(missing_ok=True)
+    except (OSError, subprocess.SubprocessError) as error:
+        reason = " ".join(str(error).split())
+        (COMPILED / WHY_NOT).write_text(reason, encoding="utf-8")
+    _forget({each.folder for each in wanted})
+    return reason
+
+
+def _forget(keep: set[Path]) -> None:
+    """All folders but these, and what compilations that were killed have left."""
+    for path in COMPILED.iterdir():
+        at_work = path.name.startswith(".") and time.time() - path.stat().st_mtime < TIME_LIMIT
+        if path.is_dir() and path not in keep and not at_work:
+            shutil.rmtree(path, ignore_errors=True)  # on Windows one that is loaded stays
+
+
+def _compile(wanted: Sequence[Library], platforms: Iterable[str]) -> None:
+    """All libraries and platforms side by side; each file is written at once or not at all."""
+    jobs = [(each, platform) for platform in platforms for each in wanted if not each.file(platform).exists()]
+    if not jobs:
+        return
+    _require_compiler()
+    with tempfile.TemporaryDirectory(prefix=".", dir=COMPILED) as place, ThreadPoolExecutor(os.cpu_count()) as pool:
+        folder = Path(place)
+        for each in {each.name: each for each, _ in jobs}.values():
+            (folder / each.name).mkdir()
+            for name, content in each.files.items():
+                (folder / each.name / name).write_bytes(content)
+        for outcome in [pool.submit(_compile_one, each, platform, folder) for each, platform in jobs]:
+            outcome.result()
+
+
+def _compile_one(each: Library, name: str, folder: Path) -> None:
+    platform, path = PLATFORMS[name], each.file(name)
+    made = folder / f"{each.name}-{name}"
+    made.mkdir()
+    command = [*compiler(platform), *LIBRARY_OPTIONS, *each.sources, *platform.options]
+    if platform.suffix == ".dylib":
+        command.append(f"-Wl,-install_name,@rpath/{path.name}")
+    done = subprocess.run(
+        [*command, "-o", f"../{made.name}/{path.name}"], cwd=folder / each.name,
+        env={**os.environ, **caches(folder / "cache")}, capture_output=True, text=True, check=False, timeout=TIME_LIMIT,
+    )  # fmt: skip
+    if done.returncode != 0:
+        raise OSError(f"compiling {each.name} for {platform.target} failed: {done.stderr.strip()}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    (made / path.name).replace(path)
+
+
+def compiler(platform: Platform) -> list[str]:
+    """The compiler for a platform, with the options of every compilation."""
+    home = resources.files(COMPILER[0])
+    command = [str(home / ("zig.exe" if os.name == "nt" else "zig")), "cc", "-target", platform.target, *OPTIONS, "-I."]
+    if "-lkernel32" in platform.options:  # no C library: its headers are to be named
+        command += ["-isystem", str(home / "lib" / "libc" / "include" / "any-windows-any")]
+    return command
+
+
+def caches(folder: Path) -> dict[str, str]:
+    """The environment in which the compiler keeps nothing but in that folder."""
+    return {"ZIG_GLOBAL_CACHE_DIR": str(folder), "ZIG_LOCAL_CACHE_DIR": str(folder)}
+
+
+def _require_compiler() -> None:
+    package, version = COMPILER
+    if os.environ.get(LEAVE_OUT):
+        raise OSError(f"{LEAVE_OUT} is set")
+    try:
+        found = metadata.version(package)
+    except metadata.PackageNotFoundError:
+        raise OSError(f"no compiler: {package} {version} is not installed, or not to be had for this machine") from None
+    if found != version:
+        raise OSError(f"{package} {found} is installed: must be {version}, which makes the bytes")
+
+
+if __name__ == "__main__":
+    sys.exit(compile_all())

@@ -1,0 +1,118 @@
+"""Machine code: compiled once, carried by the wheel, never run where the C has changed since."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from hovercraft_fmu import cli
+from hovercraft_fmu.building import PRODUCTS, build
+from hovercraft_fmu.fmu import machine_code
+from hovercraft_fmu.fmu.description import NATIVE
+from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all, library
+from tests.conftest import FMI_2
+
+
+@pytest.fixture
+def nothing_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder in the place of compiled/."""
+    folder = tmp_path / "compiled"
+    monkeypatch.setattr(machine_code, "COMPILED", folder)
+    return folder
+
+
+@pytest.fixture
+def one_platform(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Instead of all, which take long."""
+    monkeypatch.setattr(machine_code, "PLATFORMS", {"x86_64-linux": PLATFORMS["x86_64-linux"]})
+
+
+def files_of(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.usefixtures("one_platform")
+def test_changed_c_is_never_run_as_old_machine_code(
+    nothing_compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changed = tmp_path / "native"
+    shutil.copytree(machine_code.C_FOLDER, changed)
+    monkeypatch.setattr(machine_code, "C_FOLDER", changed)
+    if reason := compile_all():
+        pytest.skip(reason)
+    old = library(NATIVE).path("x86_64-linux")
+    assert old.exists()
+    with (changed / "kernel.c").open("a") as file:
+        file.write("/* changed */\n")
+    with pytest.raises(NotCompiledError, match=r"the C was changed since.*pip install -e"):
+        library(NATIVE).path("x86_64-linux")
+    assert compile_all() == ""
+    assert library(NATIVE).path("x86_64-linux").exists()
+    assert not old.exists()
+    (changed / "kernel.c").write_text("#error on purpose\n")
+    assert "on purpose" in compile_all()
+    with pytest.raises(NotCompiledError, match=r"compiling .* for x86_64-linux-gnu\.2\.17 failed: .*on purpose"):
+        library(NATIVE).path("x86_64-linux")
+    assert files_of(nothing_compiled) == {"why_not.txt"}
+
+
+@pytest.mark.parametrize(
+    ("variable", "version", "says"),
+    [("1", machine_code.COMPILER[1], "HOVERCRAFT_FMU_NO_COMPILER is set"), ("", "0.0.1", "must be 0.0.1")],
+)
+def test_a_compiler_that_is_left_out_or_another(
+    variable: str, version: str, says: str, nothing_compiled: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The Python FMU is written all the same, and what is missing is said in one line."""
+    monkeypatch.setenv(machine_code.LEAVE_OUT, variable)
+    monkeypatch.setattr(machine_code, "COMPILER", ("ziglang", version))
+    assert says in compile_all()
+    done = CliRunner().invoke(cli.commands, ["build", "native", "python", "--output", str(tmp_path / "out")])
+    assert done.exit_code == 1
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["Hovercraft.fmu"]
+    last = done.output.splitlines()[-1]
+    assert last.startswith("Error: HovercraftNative.fmu was not written: no machine code of HovercraftNative: ")
+    assert says in last
+    assert "pip install" in last
+    assert files_of(nothing_compiled) == {"why_not.txt"}
+
+
+@pytest.mark.once
+@pytest.mark.usefixtures("complete_native_fmu")
+@FMI_2
+def test_the_same_bytes_again(nothing_compiled: Path) -> None:
+    """From an empty cache, in another folder."""
+    compiled = Path(machine_code.__file__).parent / "compiled" / library(NATIVE).folder.name
+    assert compile_all() == ""
+    again = library(NATIVE).folder
+    assert nothing_compiled in again.parents
+    assert len(files_of(again)) == len(PLATFORMS)
+    assert files_of(again) == files_of(compiled)
+    assert all((again / name).read_bytes() == (compiled / name).read_bytes() for name in files_of(again))
+
+
+@pytest.mark.once
+def test_the_command_writes_everything(tmp_path: Path, complete_native_fmu: Path, standard: int, fmu: Path) -> None:
+    done = CliRunner().invoke(cli.commands, ["build", "--output", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert {path.name for path in tmp_path.iterdir()} == {each.name for each in PRODUCTS.values()}
+    for line, each in zip(done.output.splitlines(), PRODUCTS.values(), strict=True):
+        assert line.startswith(f"{tmp_path / each.name}: ")
+        assert line.endswith(each.purpose)
+    native = PRODUCTS["native" if standard == 2 else "native3"].name
+    assert (tmp_path / native).read_bytes() == complete_native_fmu.read_bytes()
+    assert (tmp_path / fmu.name).read_bytes() == fmu.read_bytes()
+
+
+def test_what_cannot_be_built(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="kind = 'natvie': must be one of native, native3"):
+        build("natvie")  # type: ignore[arg-type]
+    done = CliRunner().invoke(cli.commands, ["build", "python", "x", "--output", str(tmp_path / "new")])
+    assert str(done.exception).startswith("kind = 'x': must be one of native, ")
+    assert not list(tmp_path.iterdir())
+    file = tmp_path / "file"
+    file.write_text("")
+    refused = CliRunner().invoke(cli.commands, ["build", "python", "--output", str(file)])
+    assert refused.exit_code != 0
+    assert "is a file" in refused.output
