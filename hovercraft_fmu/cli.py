@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Event, Thread
 from time import perf_counter
 from typing import Any
 
@@ -34,6 +35,7 @@ from .host import SimulationError
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES, VOYAGES
 from .simulation import DEFAULT_FMU, Inputs, Result, default_fmu, plan, simulate
+from .studies import STUDIES, carry_out
 from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE
 from .view.tables import markdown
@@ -41,6 +43,8 @@ from .view.tables import markdown
 DEMO_FOLDER = Path("build") / "demo"
 DEMO_LOG = CONTROL_LOGS / "ice.csv"
 OUTPUT = Console(soft_wrap=True, highlight=False, width=None if sys.stdout.isatty() else 160)
+LINE_EVERY = 10.0
+"""s: of progress, where it is not shown on a terminal."""
 EXPECTED = (ValueError, OSError, ArithmeticError, SimulationError, ModuleNotFoundError)
 """What a wrong name, file or value ends in: one line, no traceback."""
 
@@ -291,26 +295,24 @@ def trade(quick: bool, output: Path) -> None:
     OUTPUT.print(step_costs.run(output))
 
 
-@commands.command()
-@click.option(
-    "--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("build") / "stability", show_default=True
-)
-def stability(output: Path) -> None:
-    """Measure where each method breaks: limits of the step, and a random study of the extremes."""
-    from .studies import stability as study
+MEASURE = """Measure the product: what speed costs, what accuracy costs, where the methods break.
 
-    _measure(study.run, output)
+NAME is one of the studies; what each takes is on a machine with nothing else to do:
+
+\b
+"""
+MEASURE += "\n".join(f"  {name:12} {study.what} ({study.takes})" for name, study in STUDIES.items())
 
 
-@commands.command("scene-terms")
-@click.option(
-    "--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("build") / "scene_terms", show_default=True
-)
-def scene_terms(output: Path) -> None:
-    """Measure what each opt-in term costs, and what leaving it out costs in accuracy, over the scenes."""
-    from .studies import scene_terms as study
-
-    _measure(study.run, output)
+@commands.command(help=MEASURE)
+@click.argument("name", metavar="NAME", type=click.Choice(list(STUDIES)))
+@click.option("--quick", is_flag=True, help="Fewer cases: below half a minute.")
+@click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Default: build/measure/NAME.")
+def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 - MEASURE
+    folder = output or Path("build") / "measure" / name
+    with _progress(1.0, f"measuring {name}") as tell:
+        report = carry_out(name, quick, folder, tell)
+    OUTPUT.print(f"{report}\n\nwrote {folder}/", markup=False)
 
 
 @commands.command("sweep")
@@ -362,17 +364,6 @@ def sweep_command(
     return None
 
 
-@commands.command()
-@click.option(
-    "--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("build") / "coupling", show_default=True
-)
-def coupling(output: Path) -> None:
-    """Measure what the communication step of the closed loop costs, for two ways to couple, beside the integrator."""
-    from .studies import closed_loop as study
-
-    _measure(study.run, output)
-
-
 @commands.command("cross-check")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 def cross_check_command(folder: Path) -> None:
@@ -411,12 +402,23 @@ class _Rate(ProgressColumn):
 
 @contextmanager
 def _progress(total: float, doing: str = "simulating", *more: ProgressColumn) -> Iterator[Callable[[float], None]]:
-    """A bar with the time left, on a terminal; it goes away when the run has ended."""
+    """A bar with the time left, on a terminal; it goes away when the run has ended. Else a line every ten seconds."""
     columns = (TextColumn(doing), BarColumn(), TaskProgressColumn(), *more, TimeRemainingColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("", total=total)
-        yield lambda time: progress.update(task, completed=time)
+        number, ended = progress.add_task("", total=total), Event()
+        if not console.is_terminal:
+            Thread(target=_tell_lines, args=(doing, progress.tasks[number], ended), daemon=True).start()
+        try:
+            yield lambda time: progress.update(number, completed=time)
+        finally:
+            ended.set()
+
+
+def _tell_lines(doing: str, task: Task, ended: Event) -> None:
+    begun = perf_counter()
+    while not ended.wait(LINE_EVERY):
+        click.echo(f"{doing}: {task.percentage:.0f} %, {perf_counter() - begun:.0f} s", err=True)
 
 
 def _measure(study: Callable[[Path, Callable[[float], None]], Group], output: Path) -> None:

@@ -163,7 +163,7 @@ def test_both_schemes_are_of_first_order() -> None:
 
 @pytest.mark.once
 def test_the_command_writes_what_is_committed(tmp_path: Path) -> None:
-    done = CliRunner().invoke(commands, ["coupling", "--output", str(tmp_path)])
+    done = CliRunner().invoke(commands, ["measure", "coupling", "--output", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "order in the communication step: jacobi 1.0" in done.output
     for name in ("coupling.csv", "coupling_course.csv"):

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,32 +21,23 @@ from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator_number
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, stability_number
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.studies.stability import (
+from hovercraft_fmu.studies.batches import FIXED, Batch, chosen, single
+from hovercraft_fmu.studies.extremes import (
     ACCURATE,
     FAILED,
-    FIXED,
-    QUALITIES,
     SAMPLINGS,
     SILENT,
     SUBSTEPS,
     VERDICTS,
     WITH_TERMS,
-    Case,
-    Extremes,
     Judged,
-    Runs,
-    cases,
-    chosen,
     judge,
-    largest_first_step,
-    largest_step,
     measure_adaptive,
     measure_extremes,
     sample,
     shares,
-    single,
-    theory,
 )
+from hovercraft_fmu.studies.stability import QUALITIES, Motion, largest_first_step, largest_step, motions, theory
 from tests.lowlevel import another, count, get, one, reference
 from tests.test_trade import RESULTS, records
 
@@ -58,18 +49,16 @@ FIXED_STEP = pytest.mark.parametrize("method", FIXED, ids=lambda each: each.name
 # ---- the map
 
 
-def two_craft(case: Case) -> Case:
+def two_craft(motion: Motion) -> Motion:
     """The textbook's and a hard one: 1 g, a thrust of 10^9 N, 10^6 m/s."""
-    shape = case.scale.shape
-    craft: Any = {each.name: np.broadcast_to(getattr(case.craft, each.name), shape)[:2] for each in fields(Craft)}
-    return case._replace(craft=Craft(**craft), thrust=case.thrust[:2], scale=case.scale[:2], unit=case.unit[:2])
+    return motion._replace(crafts=chosen(motion.crafts, slice(0, 2)))
 
 
-@pytest.mark.parametrize("case", [two_craft(case) for case in cases()], ids=lambda case: case.name)
+@pytest.mark.parametrize("motion", list(map(two_craft, motions())), ids=lambda motion: motion.name)
 @FIXED_STEP
-def test_limits_are_those_of_theory(method: Any, case: Case) -> None:
-    for quality, expected in zip(QUALITIES, theory(method, case.name), strict=True):
-        measured = largest_step(case, method, quality)
+def test_limits_are_those_of_theory(method: Any, motion: Motion) -> None:
+    for quality, expected in zip(QUALITIES, theory(method, motion.name), strict=True):
+        measured = largest_step(motion, method, quality)
         assert measured[0] == pytest.approx(measured[1], rel=1e-3)  # nothing of the craft is left in them
         if not math.isnan(expected):
             # the disturbance of 1e-4; and a chaotic transient may outlast the sub-steps close above its end
@@ -78,13 +67,13 @@ def test_limits_are_those_of_theory(method: Any, case: Case) -> None:
 
 def test_rk4_under_thrust_diverges_beyond_its_false_speed() -> None:
     rk4 = next(each for each in FIXED if each.name == "rk4")
-    assert largest_step(two_craft(cases()[1]), rk4, "bounded") == pytest.approx(2.06, abs=0.01)  # measured
+    assert largest_step(two_craft(motions()[1]), rk4, "bounded") == pytest.approx(2.06, abs=0.01)  # measured
 
 
 @FIXED_STEP
 def test_the_limits_of_the_fmu_are_where_the_terminal_speed_is_left(method: Any) -> None:
     """The stability number is 2*x with the drag centre at 0; where answers stay right it may have no limit, or one."""
-    left = 2.0 * float(largest_step(two_craft(cases()[1]), method, "stable")[0])
+    left = 2.0 * float(largest_step(two_craft(motions()[1]), method, "stable")[0])
     assert method.stability_limit <= left * 1.001
 
 
@@ -92,30 +81,31 @@ def test_the_limits_of_the_fmu_are_where_the_terminal_speed_is_left(method: Any)
 
 
 @pytest.fixture(scope="module")
-def extremes() -> Extremes:
-    return measure_extremes(12288, seed=20)
+def extremes() -> list[dict[str, Any]]:
+    """The rows of the table."""
+    return shares(measure_extremes(12288, seed=20)).to_dicts()
 
 
-def test_no_run_is_wrong_in_silence(extremes: Extremes) -> None:
-    for share in shares(extremes):
-        assert share.silent == 0.0
+def test_no_run_is_wrong_in_silence(extremes: list[dict[str, Any]]) -> None:
+    for share in extremes:
+        assert share["silent"] == 0.0
         # the theory's 1/2 of the bound, and what the reference may err; with friction and kinks, what was seen
-        assert share.worst <= (0.95 if share.sampling == WITH_TERMS else 0.6)
-        assert share.doubt <= 0.5
-        assert share.accurate + share.vague + share.warned + share.failed == pytest.approx(1.0)
+        assert share["worst"] <= (0.95 if share["sampling"] == WITH_TERMS else 0.6)
+        assert share["doubt"] <= 0.5
+        assert share["accurate"] + share["vague"] + share["warned"] + share["failed"] == pytest.approx(1.0)
 
 
-def test_not_everything_warns(extremes: Extremes) -> None:
+def test_not_everything_warns(extremes: list[dict[str, Any]]) -> None:
     """Shares of 12 288 runs: their scatter is below half a percent."""
-    for share in shares(extremes):
-        own = share.sampling != next(iter(SAMPLINGS))
-        assert share.accurate > (0.7 if own else 0.2)  # within a bound that says something
-        assert share.warned > (0.03 if own else 0.2)
-        assert share.wrong < 0.02
-        if share.method == "drag_implicit":
-            assert share.failed == 0.0
+    for share in extremes:
+        own = share["sampling"] != next(iter(SAMPLINGS))
+        assert share["accurate"] > (0.7 if own else 0.2)  # within a bound that says something
+        assert share["warned"] > (0.03 if own else 0.2)
+        assert share["wrong"] < 0.02
+        if share["method"] == "drag_implicit":
+            assert share["failed"] == 0.0
         elif not own:
-            assert share.failed > 0.1
+            assert share["failed"] > 0.1
 
 
 @settings(max_examples=40)
@@ -142,7 +132,7 @@ def test_the_bound_falls_with_the_order_of_the_method(method: Any) -> None:
 @pytest.mark.once
 def test_the_command(tmp_path: Path) -> None:
     """The whole study; and what is committed is what it writes, but for the last bits of another machine's sines."""
-    done = CliRunner().invoke(commands, ["stability", "--output", str(tmp_path / "new")])
+    done = CliRunner().invoke(commands, ["measure", "stability", "--output", str(tmp_path / "new")])
     assert done.exit_code == 0, done.output
     assert "bound of rk4: 1*(N*lambda*eps^4 + s*sigma*eps^2)*V" in done.output
     for name in ("stability.csv", "extremes.csv"):
@@ -156,16 +146,16 @@ def test_the_command(tmp_path: Path) -> None:
 
 
 def test_the_adaptive_method_meets_its_tolerance_or_says_that_it_cannot() -> None:
-    share = measure_adaptive()
-    assert share.silent == 0.0
-    assert share.accurate > 0.95
-    assert share.failed < 0.05
-    assert share.wrong == 0.0
+    (share,) = shares(measure_adaptive()).to_dicts()
+    assert share["silent"] == 0.0
+    assert share["accurate"] > 0.95
+    assert share["failed"] < 0.05
+    assert share["wrong"] == 0.0
 
 
 def test_the_adaptive_method_takes_any_first_step() -> None:
-    for case in cases():
-        for limits in largest_first_step(case).values():
+    for motion in motions():
+        for limits in largest_first_step(motion).values():
             assert len(limits) >= 3
             assert all(limit == math.inf for limit in limits)
 
@@ -188,15 +178,15 @@ def instances(fmu: Path) -> Iterator[list[Any]]:
             extra.freeInstance()
 
 
-def on_the_fmu(instances: list[Any], method: Any, runs: Runs, i: int) -> tuple[int, State | None, list[float]]:
+def on_the_fmu(instances: list[Any], method: Any, runs: Batch, i: int) -> tuple[int, State | None, list[float]]:
     """The warnings, the end (None: a step was refused) and what was watched, of run i."""
     instance = instances[-1]
     instance.reset()
-    craft, controls, begin = single(runs, i)
+    craft, controls, begin, h, _ = single(runs, i)
     values: dict[str, Any] = {name: getattr(craft, name) for name in CRAFT_PARAMETERS}
     area = values.pop("drag_area")
     values |= dict(zip((*STATES, *INPUTS), (*begin, *controls), strict=True))
-    h = values["step_size"] = float(runs.h[i])
+    values["step_size"] = h
     instance.setupExperiment()
     instance.setReal([reference(name) for name in values], list(values.values()))
     instance.setInteger([reference("integrator"), reference("drag_area")], [integrator_number(method.name), area])
@@ -219,7 +209,7 @@ def test_the_fmu_agrees_with_the_verdicts(instances: list[Any], method: Any) -> 
     for sampling in SAMPLINGS:
         runs = sample(rng, REPEATED // 2, STEPS, sampling)
         judged = judge(runs, [method])[method.name]
-        sigma, rho = judged.outcome.sigma, judged.outcome.rho
+        sigma, rho = judged.numbers.sigma, judged.numbers.rho
         for i in range(REPEATED // 2):
             warned, end, watched = on_the_fmu(instances, method, runs, i)
             assert (end is None) == (judged.verdict[i] == FAILED), (sampling, i, VERDICTS[judged.verdict[i]])
@@ -234,13 +224,13 @@ def test_the_fmu_agrees_with_the_verdicts(instances: list[Any], method: Any) -> 
                 assert watched[0] == pytest.approx(sigma[i], rel=1e-6)  # some hundred roundings
                 # sines of numpy and of Python differ in the last bit
                 difference = _speed_difference(end, judged, i, float(chosen(runs, [i]).craft.drag_center[0]))  # type: ignore[index]
-                assert difference <= 1e-11 * judged.outcome.speed[i]
+                assert difference <= 1e-11 * judged.numbers.speed[i]
     assert compared > 0.4 * REPEATED
     assert (failed == 0) == (method.name == "drag_implicit")
 
 
 def _speed_difference(end: State, judged: Judged, i: int, x_d: float) -> float:
-    vx, vy, yaw_rate = (float(np.asarray(values)[i]) for values in judged.outcome.end[3:])
+    vx, vy, yaw_rate = (float(np.asarray(values)[i]) for values in judged.numbers.end[3:])
     return max(abs(end.vx - vx), abs(end.vy - vy), abs(x_d * (end.yaw_rate - yaw_rate)))
 
 

@@ -1,14 +1,11 @@
 """What the communication step of the closed loop costs in accuracy, beside what the integrator costs."""
 
-import csv
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
-from rich.console import Group
-from rich.table import Table
 
 from ..autopilot.guidance import Pilot, Waypoint, helm, line_of_sight, wanted_force
 from ..coupling import GAUSS_SEIDEL, JACOBI, SCHEMES, BareAutopilot, BareCraft, sail_bare
@@ -16,11 +13,14 @@ from ..model.dynamics import Controls, State, derivatives
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..scenes import VOYAGES
+from ..view.palette import INK, METHODS, OTHER, QUIET
 from ..view.plots import new_figure
+from .laboratory import Findings, Shown, Tell, part, table
 from .reference_end import TOLERANCES, scipy_module
-from .trade import machine
 
-Tell = Callable[[float], None]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 VOYAGE = VOYAGES["crosswind"]
 STRETCH = 120.0
 """s, from rest: the craft speeds up, turns into the wind, and comes to the leg; before the first waypoint."""
@@ -41,7 +41,7 @@ Path2 = NDArray[np.float64]
 """Positions [m] every EVERY s, shape (n, 2)."""
 
 
-class CouplingRow(NamedTuple):
+class LoopError(NamedTuple):
     """A stretch of the voyage."""
 
     error_of: str
@@ -52,7 +52,7 @@ class CouplingRow(NamedTuple):
     """m, the largest"""
 
 
-class CourseRow(NamedTuple):
+class CourseMade(NamedTuple):
     """The whole course."""
 
     scheme: str
@@ -102,111 +102,80 @@ def _apart(a: Path2, b: Path2) -> float:
     return float(np.hypot(*(a - b).T).max())
 
 
-def measure(tell: Tell) -> list[CouplingRow]:
+def errors(steps: Sequence[float], exact: Path2, tell: Tell) -> list[LoopError]:
     """Both schemes against the continuous loop; each integrator against EXACT, in the Jacobi loop."""
-    exact, _ = continuous()
     rows = []
-    for done, step in enumerate(STEPS, 1):
+    for done, step in enumerate(steps, 1):
         paths = {scheme: sampled(scheme, step) for scheme in SCHEMES}
-        rows += [CouplingRow(scheme, step, _apart(path, exact)) for scheme, path in paths.items()]
+        rows += [LoopError(scheme, step, _apart(path, exact)) for scheme, path in paths.items()]
         for name, settings in INTEGRATORS.items():
             if settings.step_size <= step:  # else it is the sub-step of EXACT, or another's
-                rows.append(CouplingRow(name, step, _apart(sampled(JACOBI, step, settings), paths[JACOBI])))
-        tell(0.7 * done / len(STEPS))
+                rows.append(LoopError(name, step, _apart(sampled(JACOBI, step, settings), paths[JACOBI])))
+        tell(done / len(steps))
     return rows
 
 
-def slope(rows: list[CouplingRow], error_of: str) -> float:
-    """The order that is observed: of the error over the communication step, fitted up to 1 s."""
-    own = [row for row in rows if row.error_of == error_of and row.communication_step <= 1.0]
-    steps, errors = ([row[i] for row in own] for i in (1, 2))
-    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-
-
-def measure_course(tell: Tell) -> list[CourseRow]:
+def courses(steps: Sequence[float], tell: Tell) -> list[CourseMade]:
     """Whether the craft still reaches every waypoint, and how well it holds the legs."""
     rows = []
-    for done, step in enumerate(WHOLE_STEPS, 1):
+    for done, step in enumerate(steps, 1):
         for scheme in SCHEMES:
             passage = sail_bare(VOYAGE, scheme=scheme, communication_step=step, settings=EXACT)
             arrived = f"{passage['time'][-1]:g} s" if passage.arrived else "never"
             off = float(np.sqrt(np.mean(passage["cross_track_error"] ** 2)))
-            rows.append(CourseRow(scheme, step, arrived, off))
-        tell(0.7 + 0.3 * done / len(WHOLE_STEPS))
+            rows.append(CourseMade(scheme, step, arrived, off))
+        tell(done / len(steps))
     return rows
 
 
-# ---- the study
+def order(found: pl.DataFrame, error_of: str) -> float:
+    """The order that is observed: of the error over the communication step, fitted up to 1 s."""
+    own = found.filter((pl.col("error_of") == error_of) & (pl.col("communication_step") <= 1.0))
+    return float(np.polyfit(np.log(own["communication_step"]), np.log(own["position_error"]), 1)[0])
 
 
-def run(folder: Path, tell: Tell = lambda _: None) -> Group:
-    """Measure, write coupling.csv, coupling_course.csv and coupling.png, and return what is to be printed."""
-    folder.mkdir(parents=True, exist_ok=True)
-    rows = measure(tell)
-    course = measure_course(tell)
-    _write(folder / "coupling.csv", rows)
-    _write(folder / "coupling_course.csv", course)
-    draw(rows, folder / "coupling.png")
-    _, off = continuous()
-    schemes = ", ".join(f"{scheme} {slope(rows, scheme):.2f}" for scheme in SCHEMES)
-    half = {row.error_of: row.position_error for row in rows if row.communication_step == VOYAGE.communication_step}
-    return Group(
-        _table(rows),
-        f"\norder in the communication step: {schemes}; at {VOYAGE.communication_step:g} s jacobi errs "
-        f"{half[JACOBI] / half[GAUSS_SEIDEL]:.2f} times as much; the continuous loop is known to {off:.1g} m",
-        _course_table(course),
-        f"\n{machine()}",
-        f"\nwrote {folder}/",
+def study(quick: bool, tell: Tell) -> Findings:
+    """The errors of a stretch and the whole course; quick: fewer communication steps."""
+    exact, off = continuous()
+    steps, whole = (STEPS[3:], WHOLE_STEPS[2:5]) if quick else (STEPS, WHOLE_STEPS)
+    found = table(errors(steps, exact, part(tell, 0.0, 0.7)))
+    course = table(courses(whole, part(tell, 0.7, 1.0)))
+    half = {error_of: error for error_of, step, error in found.iter_rows() if step == VOYAGE.communication_step}
+    schemes = ", ".join(f"{scheme} {order(found, scheme):.2f}" for scheme in SCHEMES)
+    wide = found.pivot("error_of", index="communication_step", values="position_error")
+    return Findings(
+        {"coupling": found, "coupling_course": course},
+        [
+            Shown(f"The largest position error [m] in the first {STRETCH:g} s of '{VOYAGE.name}'", wide),
+            Shown(f"The whole course of '{VOYAGE.name}'", course),
+        ],
+        {"coupling": draw(found)},
+        [
+            f"order in the communication step: {schemes}; at {VOYAGE.communication_step:g} s jacobi errs "
+            f"{half[JACOBI] / half[GAUSS_SEIDEL]:.2f} times as much; the continuous loop is known to {off:.1g} m"
+        ],
     )
 
 
-def _write(path: Path, rows: Sequence[CouplingRow] | Sequence[CourseRow]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(rows[0]._fields)
-        writer.writerows(rows)
-
-
-def _table(rows: list[CouplingRow]) -> Table:
-    kinds = list(dict.fromkeys(row.error_of for row in rows))
-    errors = {(row.communication_step, row.error_of): f"{row.position_error:.2g}" for row in rows}
-    title = f"largest position error \\[m] in the first {STRETCH:g} s of '{VOYAGE.name}'"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    for column in ("communication step \\[s]", *kinds):
-        table.add_column(column)
-    for step in STEPS:
-        table.add_row(f"{step:g}", *(errors.get((step, kind), "") for kind in kinds))
-    return table
-
-
-def _course_table(rows: list[CourseRow]) -> Table:
-    title = f"\nthe whole course of '{VOYAGE.name}'"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    for title in ("scheme", "communication step \\[s]", "arrived after", "off the legs, rms \\[m]"):
-        table.add_column(title)
-    for row in rows:
-        table.add_row(row.scheme, f"{row.communication_step:g}", row.arrived, f"{row.cross_track_error:.2f}")
-    return table
-
-
-def draw(rows: list[CouplingRow], path: Path) -> None:
+def draw(found: pl.DataFrame) -> "Figure":
     """Position error against the communication step, log-log."""
     figure = new_figure(figsize=(7.6, 4.8), dpi=110, layout="constrained")
     axes = figure.add_subplot()
-    styles = {JACOBI: ("#0b4f6c", "o", "-"), GAUSS_SEIDEL: ("#f08a24", "s", "-")}
-    integrators = zip(INTEGRATORS, ("#5b7f95", "#8e44ad", "#2a9d4b"), strict=True)
-    styles |= {name: (color, "", ":") for name, color in integrators}
+    styles = {JACOBI: (INK, "P", "-"), GAUSS_SEIDEL: (OTHER, "v", "-")}
+    for (name, settings), line in zip(INTEGRATORS.items(), (":", "--", ":"), strict=True):
+        styles[name] = (*METHODS[settings.integrator.name], line)
     for name, (color, marker, line) in styles.items():
-        own = [row for row in rows if row.error_of == name]
+        own = found.filter(error_of=name)
         label = name if name in SCHEMES else f"the integrator's error: {name}"
-        axes.loglog([row.communication_step for row in own], [row.position_error for row in own], color=color,
-                    marker=marker, linestyle=line, label=label)  # fmt: skip
-    first = next(row for row in rows if row.error_of == JACOBI)
-    axes.loglog(STEPS, [first.position_error * step / STEPS[0] for step in STEPS], color="grey", linestyle="--",
-                linewidth=1.0, label="first order")  # fmt: skip
+        axes.loglog(own["communication_step"], own["position_error"], color=color, marker=marker, markersize=5,
+                    linestyle=line, label=label)  # fmt: skip
+    first = found.filter(error_of=JACOBI)
+    steps = first["communication_step"]
+    axes.loglog(steps, first["position_error"][0] * steps / steps[0], color=QUIET, linestyle="-.", linewidth=1.0,
+                label="first order")  # fmt: skip
     axes.set_xlabel("communication step [s]")
     axes.set_ylabel(f"largest position error in {STRETCH:g} s [m]")
     axes.set_title("What the communication step of the loop costs")
     axes.grid(which="major", alpha=0.3)
     axes.legend(frameon=False, fontsize="small")
-    figure.savefig(path, format="png", metadata={"Software": None})
+    return figure

@@ -77,5 +77,5 @@ def scipy_module(name: str) -> Any:
         return importlib.import_module(f"scipy.{name}")
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
-            "the trade is measured against scipy, which is not installed: pip install 'hovercraft-fmu[trade]'"
+            "the trade is measured against scipy, which is not installed: pip install 'hovercraft-fmu[studies]'"
         ) from error
