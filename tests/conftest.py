@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -16,6 +16,7 @@ from hovercraft_fmu.autopilot.pilot_package import build_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all
 from hovercraft_fmu.fmu.native_package import build_native_fmu
+from tests.lowlevel import one
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -23,8 +24,6 @@ settings.load_profile("repeatable")
 ROOT = Path(__file__).parent.parent
 Fresh: TypeAlias = Callable[..., str]
 Built: TypeAlias = Callable[[str, Callable[[Path], Path]], Path]
-
-
 HERE = {"linux": ["x86_64-linux"], "win32": ["x86_64-windows"], "darwin": ["x86_64-darwin", "aarch64-darwin"]}
 """Platforms that a machine needs of a native FMU."""
 
@@ -125,6 +124,13 @@ def each_native_fmu(standard: int, request: pytest.FixtureRequest) -> Path:
     """The native FMU of FMI 2.0, then that of FMI 3.0."""
     made: Path = request.getfixturevalue("native_fmu" if standard == 2 else "native3_fmu")
     return made
+
+
+@pytest.fixture(scope="module")
+def stepped(each_native_fmu: Path) -> Iterator[Any]:
+    """An instance for co-simulation, for a module whose `shared` one is for model exchange."""
+    with one(each_native_fmu) as (made, _):
+        yield made
 
 
 FMI_2 = pytest.mark.parametrize("standard", [2], indirect=True)

@@ -1,6 +1,6 @@
 """Co-simulation beyond what the Python FMU can do: ramps, derivatives, status, pointers, refused instances.
 
-What both flavours must do is in test_lifecycle.py, model exchange in test_exchange.py."""
+What both flavours must do is in test_lifecycle.py, model exchange in test_exchange.py and its neighbours."""
 
 import math
 import os
@@ -635,8 +635,8 @@ def test_clean_under_sanitizers_over_the_life_cycle(sanitized_fmus: list[Path]) 
     two, three = map(str, sanitized_fmus)
     env = {**os.environ, "NATIVE_FMU": two, "NATIVE3_FMU": three, "LD_PRELOAD": ":".join(runtime), "CI": "",
            "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=0"}  # fmt: skip
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/test_lifecycle.py",
-               "tests/test_native.py", "tests/test_exchange.py", "tests/test_fmi3.py",
+    files = [f"tests/test_{each}.py" for each in ("lifecycle", "native", "exchange", "partial_derivatives", "fmi3")]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files,
                "-k", "not python and not sanitize and not other_hosts and not bits_of_fmi_2"]  # fmt: skip
     done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False, timeout=900)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
