@@ -23,15 +23,14 @@ def test_twelve_seconds_without_a_finding(flavour: Flavour, tmp_path: Path) -> N
 
 
 SPOILED = {
-    "instance.c": (
+    "variables.c": (
         "    for (size_t i = 0; i < n; i++) { /* all are checked before one is set */\n",
-        "        if (is_real(references[i]) && input_of(references[i]) < INPUT_COUNT)\n"
+        "        if (is_real(references[i]) && instance_place(INPUTS, INPUT_COUNT, references[i]) < INPUT_COUNT)\n"
         "            instance->now.reals[references[i]] = 1.0;\n",
     ),
     "exchange.c": (
         "    struct content *now = &instance->now;\n",
-        "    if (now->phase == CONTINUOUS_TIME && values && n > 0 && isfinite(values[0]))\n"
-        "        now->state.x = values[0], now->moved = true;\n",
+        "    if (n > 0 && isfinite(values[0]))\n        now->state.x = values[0], now->motion_unread = true;\n",
     ),
     "partials.c": (
         "    kernel_linearize(&now->state, &now->controls, &now->craft, now->phase == INITIALIZING, linearization);\n",

@@ -49,10 +49,15 @@ SOURCES = (
     "linearization.c",
     "logarithm.c",
     "memory.c",
+    "messages.c",
     "partials.c",
+    "permits.c",
+    "rates.c",
     "serialize.c",
+    "step.c",
     "text.c",
     "trig.c",
+    "variables.c",
 )
 """Whatever the standard."""
 LOG_CATEGORIES = {

@@ -2,10 +2,11 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import fields
 
 from ..model.craft import DERIVED, NOT_NEGATIVE, POSITIVE, Craft
+from ..model.dynamics import Controls, State
 from ..model.integrators import INTEGRATORS
 from .description import guid
 from .interface import (
@@ -40,7 +41,7 @@ HEADER = """\
 #include <math.h>
 #include <stddef.h>
 
-#include "linearization.h"
+#include "kernel.h"
 
 #define BUILD "{build}"
 #define GUID "{guid}"
@@ -53,6 +54,11 @@ enum {{
 enum {{ V_TIME = {time} }}; /* of FMI 3.0 alone; not in `reals` */
 
 enum {{ {counts} }};
+/* What derivatives are taken with respect to: states and inputs, and, at the start, the numbers of struct craft. */
+enum {{ KNOWN_COUNT = STATE_COUNT + INPUT_COUNT, INITIAL_KNOWN_COUNT = KNOWN_COUNT + CRAFT_REAL_COUNT }};
+enum known {{ {known} }};
+/* And what they are taken of. */
+enum row {{ {row}, ROW_COUNT }};
 enum {{ SUBSTEPS_MAX = {substeps_max} }};
 enum {{ {warnings} }};
 #define COUNTER_STOPPED_TEXT {counter_text}
@@ -117,11 +123,18 @@ static const unsigned INPUTS[] = {{{inputs}}};
 static const unsigned STATES[] = {{{states}}};
 static const unsigned DERIVATIVES[] = {{{derivatives}}}; /* of STATES */
 static const double NOMINALS[] = {{{nominals}}};         /* of STATES, in their units */
-static const unsigned KNOWNS[] = {{{knowns}}};           /* of linearization.h */
-static const unsigned ROWS[] = {{{rows}}};               /* there, too */
+static const unsigned KNOWNS[] = {{{knowns}}};
+static const unsigned ROWS[] = {{{rows}}};
 static const unsigned MOTION[] = {{{motion}}};
 static const unsigned ACTION[] = {{{action}}};
 static const unsigned WATCHED[] = {{{watched}}};
+/* Where in struct craft the known with number KNOWN_COUNT + i is. */
+static const size_t CRAFT_REALS[] = {{
+{craft_reals}
+}};
+
+/* The structures of kernel.h are in the order of the table: as numbers they are copied as a whole. */
+{agreed}
 
 #endif
 """
@@ -152,12 +165,18 @@ def variables_header(build: str) -> str:
         "STEP_UNSTABLE": STEP_UNSTABLE,
         "STEP_TURNS": STEP_TURNS,
     }
+    craft_reals = [name for name in CRAFT_PARAMETERS if BY_NAME[name].kind == "Real"]
     counts = {
         "INPUT_COUNT": len(INPUTS),
         "STATE_COUNT": len(STATES),
         "MOTION_COUNT": len(MOTION),
+        "ACTION_COUNT": len(ACTION),
+        "WATCHED_COUNT": len(WATCHED),
         "CRAFT_COUNT": len(CRAFT_PARAMETERS),
+        "CRAFT_REAL_COUNT": len(craft_reals),
+        "GIVEN_REAL_COUNT": sum(v.kind == "Real" and v.start is not None for v in VARIABLES),
     }
+    rows = (*MOTION, *DERIVATIVES[len(STATES) // 2 :], "projected_area")
     return HEADER.format(
         build=build,
         guid=guid(build),
@@ -192,21 +211,43 @@ def variables_header(build: str) -> str:
         states=_constants(STATES),
         derivatives=_constants(DERIVATIVES),
         nominals=", ".join(_number(BY_NAME[name].nominal or 1.0) for name in STATES),
-        knowns=_constants((*STATES, *INPUTS, *(name for name in CRAFT_PARAMETERS if BY_NAME[name].kind == "Real"))),
-        rows=_constants((*MOTION, *DERIVATIVES[3:], "projected_area")),
+        known=_constants((*STATES, *INPUTS), "KNOWN_"),
+        row=_constants(rows, "ROW_"),
+        knowns=_constants((*STATES, *INPUTS, *craft_reals)),
+        rows=_constants(rows),
         motion=_constants(MOTION),
         action=_constants(ACTION),
         watched=_constants(WATCHED),
+        craft_reals="\n".join(f"    offsetof(struct craft, {name})," for name in craft_reals),
+        agreed="\n".join((*_in_order("state", State._fields), *_in_order("controls", Controls._fields), *_numbered())),
     )
 
 
-def constant(name: str) -> str:
+def constant(name: str, prefix: str = "V_") -> str:
     """The C name of a variable's value reference."""
-    return "V_" + name.upper().replace(".", "_")
+    return prefix + name.upper().replace(".", "_")
 
 
-def _constants(names: Iterable[str]) -> str:
-    return ", ".join(constant(name) for name in names)
+def _constants(names: Iterable[str], prefix: str = "V_") -> str:
+    return ", ".join(constant(name, prefix) for name in names)
+
+
+def _in_order(structure: str, members: tuple[str, ...]) -> Iterator[str]:
+    """Of doubles alone, in this order."""
+    for i, member in enumerate(members):
+        yield _assertion(f"offsetof(struct {structure}, {member}) == {i} * sizeof(double)", f"{structure}.{member}")
+    yield _assertion(f"sizeof(struct {structure}) == {len(members)} * sizeof(double)", structure)
+
+
+def _numbered() -> Iterator[str]:
+    """The enumerators of kernel.h, by the names of the items."""
+    for each in ENUMERATIONS:
+        for number, (item, _) in enumerate(each.items, 1):
+            yield _assertion(f"{item.upper()} == {number}", f"{each.type_name}.{item}")
+
+
+def _assertion(condition: str, what: str) -> str:
+    return f'_Static_assert({condition}, "{what} as in the table");'
 
 
 def _row(variable: Variable) -> str:

@@ -1,4 +1,5 @@
-/* The FMI 3.0 interface: it translates, and checks pointers and types; all else is the instance's. */
+/* The FMI 3.0 interface: it translates, and checks types; all else is the instance's, with which a component begins.
+   Which arguments must not be NULL is said here, refused in permits.c. */
 
 #include <math.h>
 #include <stdbool.h>
@@ -7,6 +8,10 @@
 #include "fmi3Functions.h"
 #include "instance.h"
 #include "memory.h"
+
+#ifdef __GNUC__
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard's functions have some that a craft does not need */
+#endif
 
 struct component {
     struct instance instance;
@@ -19,6 +24,9 @@ static fmi3Status status_of(enum verdict verdict)
     return verdict == FINE ? fmi3OK : verdict == WARNED ? fmi3Warning : fmi3Error;
 }
 
+/* What comes of a call; it is made where it is permitted. */
+#define STATUS_OF(call, given, made) (permitted(c, call, given) ? status_of(made) : fmi3Error)
+
 static void tell(void *sink, enum verdict verdict, const char *category, const char *message)
 {
     const struct component *c = sink;
@@ -26,14 +34,20 @@ static void tell(void *sink, enum verdict verdict, const char *category, const c
         c->log(c->environment, status_of(verdict), category, message);
 }
 
-static fmi3Status refuse(struct component *c, const char *call, const char *why)
+static void *allocate(void *sink, size_t size)
 {
-    return c ? status_of(instance_say(&c->instance, REFUSED, "%s: %s", call, why)) : fmi3Error;
+    return memory_allocate(1, size);
 }
 
-static fmi3Status refuse_null(struct component *c, const char *call)
+static void release(void *sink, void *memory)
 {
-    return refuse(c, call, "no argument must be NULL");
+    memory_release(memory);
+}
+
+static fmi3Status refuse(struct instance *instance, const char *name, const char *why)
+{
+    return permitted_always(instance, name, true) ? status_of(instance_say(instance, REFUSED, "%s: %s", name, why))
+                                                  : fmi3Error;
 }
 
 /* ---- general */
@@ -43,10 +57,9 @@ const char *fmi3GetVersion(void)
     return fmi3Version;
 }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean on, size_t n, const fmi3String categories[])
+fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String categories[])
 {
-    struct component *c = instance;
-    return c ? status_of(instance_log(&c->instance, "fmi3SetDebugLogging", on, n, categories)) : fmi3Error;
+    return STATUS_OF(SET_DEBUG_LOGGING, n == 0 || categories, instance_log(c, on, n, categories));
 }
 
 /* NULL where there is no memory, or where the token is not this FMU's. */
@@ -56,9 +69,10 @@ static struct component *made(enum use use, fmi3String token, bool logging, fmi3
     struct component *c = memory_allocate(1, sizeof *c);
     if (!c)
         return NULL;
+    const struct services services = {3, tell, allocate, release, c};
     c->environment = environment;
     c->log = log;
-    instance_start(&c->instance, use, tell, c, logging);
+    instance_start(&c->instance, use, &services, logging);
     if (token && strcmp(token, GUID) == 0)
         return c;
     instance_say(&c->instance, REFUSED, "instantiationToken = '%q': must be '%s', as in modelDescription.xml",
@@ -76,13 +90,12 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
 {
     static const char call[] = "fmi3InstantiateCoSimulation";
     struct component *c = made(CO_SIMULATION, token, logging, environment, log);
-    (void)name, (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)update;
     if (!c || (!event_mode_used && n_intermediate == 0))
         return c;
     if (event_mode_used)
-        refuse(c, call, "eventModeUsed must be false: hasEventMode is false");
+        refuse(&c->instance, call, "eventModeUsed must be false: hasEventMode is false");
     else
-        refuse(c, call, "requiredIntermediateVariables must be empty: providesIntermediateUpdate is false");
+        refuse(&c->instance, call, "requiredIntermediateVariables must be empty: providesIntermediateUpdate is false");
     memory_release(c);
     return NULL;
 }
@@ -91,7 +104,6 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3Boolean logging, fmi3InstanceEnvironment environment,
                                           fmi3LogMessageCallback log)
 {
-    (void)name, (void)resources, (void)visible;
     return made(MODEL_EXCHANGE, token, logging, environment, log);
 }
 
@@ -102,8 +114,9 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
                                                fmi3UnlockPreemptionCallback unlock)
 {
     struct component *c = made(CO_SIMULATION, token, logging, environment, log);
-    (void)name, (void)resources, (void)visible, (void)update, (void)lock, (void)unlock;
-    refuse(c, "fmi3InstantiateScheduledExecution", "there is no ScheduledExecution in modelDescription.xml");
+    if (c)
+        refuse(&c->instance, "fmi3InstantiateScheduledExecution",
+               "there is no ScheduledExecution in modelDescription.xml");
     memory_release(c);
     return NULL;
 }
@@ -113,166 +126,138 @@ void fmi3FreeInstance(fmi3Instance instance)
     memory_release(instance);
 }
 
-fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
+fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
                                        fmi3Float64 start_time, fmi3Boolean stop_time_defined, fmi3Float64 stop_time)
 {
-    static const char call[] = "fmi3EnterInitializationMode";
-    struct component *c = instance;
-    if (!c || instance_set_up(&c->instance, call, start_time, tolerance_defined, tolerance,
-                              stop_time_defined ? stop_time : INFINITY) == REFUSED)
+    const double end = stop_time_defined ? stop_time : INFINITY;
+    if (!permitted(c, SET_UP, true) || instance_set_up(c, start_time, tolerance_defined, tolerance, end) == REFUSED)
         return fmi3Error;
-    return status_of(instance_initialize(&c->instance, call));
+    return status_of(instance_initialize(c));
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
+fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_go(&c->instance, "fmi3ExitInitializationMode")) : fmi3Error;
+    return STATUS_OF(EXIT_INITIALIZATION, true, instance_go(c));
 }
 
-fmi3Status fmi3Terminate(fmi3Instance instance)
+fmi3Status fmi3Terminate(fmi3Instance c)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_terminate(&c->instance, "fmi3Terminate")) : fmi3Error;
+    return STATUS_OF(TERMINATE, true, instance_terminate(c));
 }
 
-fmi3Status fmi3Reset(fmi3Instance instance)
+fmi3Status fmi3Reset(fmi3Instance c)
 {
-    struct component *c = instance;
-    if (!c)
-        return fmi3Error;
-    instance_reset(&c->instance);
-    return fmi3OK;
+    return STATUS_OF(RESET, true, instance_reset(c));
 }
 
 /* ---- variables: all are scalars */
 
-/* Whether a call with these lists can be made; said, where not. */
-static bool is_list(struct component *c, const char *call, const fmi3ValueReference vr[], size_t n, const void *values,
-                    size_t n_values)
+/* Whether there are as many values as variables. */
+static bool is_list(struct instance *instance, const char *name, size_t n, size_t n_values)
 {
-    if (!c)
-        return false;
-    if (n > 0 && (!vr || !values)) {
-        refuse_null(c, call);
-        return false;
-    }
     if (n_values == n)
         return true;
-    instance_say(&c->instance, REFUSED, "%s: nValues = %u: must be %u, a value for each of the scalars", call,
+    instance_say(instance, REFUSED, "%s: nValues = %u: must be %u, a value for each of the scalars", name,
                  (unsigned long long)n_values, (unsigned long long)n);
     return false;
 }
 
-/* The same, and whether all are of this kind. */
-static bool is_list_of(struct component *c, const char *call, enum kind kind, const fmi3ValueReference vr[], size_t n,
-                       const void *values, size_t n_values)
+/* And whether all are of this kind. */
+static bool is_list_of(struct instance *instance, enum call call, enum kind kind, const fmi3ValueReference vr[],
+                       size_t n, size_t n_values)
 {
     static const char *const names[] = {[REAL] = "Float64", [INTEGER] = "Int32", [ENUMERATION] = "Enumeration"};
-    if (!is_list(c, call, vr, n, values, n_values))
+    if (!is_list(instance, call_name(instance, call), n, n_values))
         return false;
     for (size_t i = 0; i < n; i++) {
         const bool fits = vr[i] == V_TIME ? kind == REAL : vr[i] < VARIABLE_COUNT && VARIABLES[vr[i]].kind == kind;
         if (!fits) {
-            instance_no_such(&c->instance, names[kind], vr[i]);
+            instance_no_such(instance, names[kind], vr[i]);
             return false;
         }
     }
     return true;
 }
 
-fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, fmi3Float64 values[],
-                          size_t n_values)
+/* As STATUS_OF, for values of one kind. */
+#define STATUS_OF_LIST(call, kind, made)                                                                               \
+    (permitted(c, call, n == 0 || (vr && values)) && is_list_of(c, call, kind, vr, n, n_values) ? status_of(made)      \
+                                                                                                : fmi3Error)
+
+static enum verdict get_floats(struct instance *instance, const fmi3ValueReference vr[], size_t n, double values[])
 {
-    struct component *c = instance;
-    if (!is_list_of(c, "fmi3GetFloat64", REAL, vr, n, values, n_values))
-        return fmi3Error;
     for (size_t i = 0; i < n; i++) {
         if (vr[i] == V_TIME)
-            values[i] = c->instance.now.time;
-        else if (instance_get_reals(&c->instance, &vr[i], 1, &values[i]) == REFUSED)
-            return fmi3Error;
+            values[i] = instance->now.time;
+        else if (instance_get_reals(instance, &vr[i], 1, &values[i]) == REFUSED)
+            return REFUSED;
     }
-    return fmi3OK;
+    return FINE;
 }
 
-fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, const fmi3Float64 values[],
-                          size_t n_values)
+static enum verdict set_floats(struct instance *instance, const fmi3ValueReference vr[], size_t n,
+                               const double values[])
 {
-    struct component *c = instance;
-    if (!is_list_of(c, "fmi3SetFloat64", REAL, vr, n, values, n_values))
-        return fmi3Error;
     for (size_t i = 0; i < n; i++)
         if (vr[i] == V_TIME)
-            return refuse(c, "fmi3SetFloat64", "time must not be set as a variable");
-    return status_of(instance_set_reals(&c->instance, vr, n, values));
+            return instance_say(instance, REFUSED, "fmi3SetFloat64: time must not be set as a variable");
+    return instance_set_reals(instance, vr, n, values);
 }
 
-fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, fmi3Int32 values[],
-                        size_t n_values)
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 values[],
+                          size_t n_values)
 {
-    struct component *c = instance;
-    return is_list_of(c, "fmi3GetInt32", INTEGER, vr, n, values, n_values)
-               ? status_of(instance_get_integers(&c->instance, vr, n, values))
-               : fmi3Error;
+    return STATUS_OF_LIST(GET_REALS, REAL, get_floats(c, vr, n, values));
 }
 
-fmi3Status fmi3SetInt32(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, const fmi3Int32 values[],
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 values[],
+                          size_t n_values)
+{
+    return STATUS_OF_LIST(SET_REALS, REAL, set_floats(c, vr, n, values));
+}
+
+fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Int32 values[], size_t n_values)
+{
+    return STATUS_OF_LIST(GET_INTEGERS, INTEGER, instance_get_integers(c, vr, n, values));
+}
+
+fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 values[],
                         size_t n_values)
 {
-    struct component *c = instance;
-    return is_list_of(c, "fmi3SetInt32", INTEGER, vr, n, values, n_values)
-               ? status_of(instance_set_integers(&c->instance, vr, n, values))
-               : fmi3Error;
+    return STATUS_OF_LIST(SET_INTEGERS, INTEGER, instance_set_integers(c, vr, n, values));
 }
 
 /* Of enumerations, which have no functions of their own. */
-fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, fmi3Int64 values[],
-                        size_t n_values)
+fmi3Status fmi3GetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Int64 values[], size_t n_values)
 {
-    struct component *c = instance;
-    if (!is_list_of(c, "fmi3GetInt64", ENUMERATION, vr, n, values, n_values))
-        return fmi3Error;
-    for (size_t i = 0; i < n; i++) {
-        int value = 0;
-        if (instance_get_integers(&c->instance, &vr[i], 1, &value) == REFUSED)
-            return fmi3Error;
-        values[i] = value;
-    }
-    return fmi3OK;
+    return STATUS_OF_LIST(GET_ENUMERATIONS, ENUMERATION, instance_get_enumerations(c, vr, n, values));
 }
 
-fmi3Status fmi3SetInt64(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, const fmi3Int64 values[],
+fmi3Status fmi3SetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int64 values[],
                         size_t n_values)
 {
-    struct component *c = instance;
-    return is_list_of(c, "fmi3SetInt64", ENUMERATION, vr, n, values, n_values)
-               ? status_of(instance_set_enumerations(&c->instance, vr, n, values))
-               : fmi3Error;
+    return STATUS_OF_LIST(SET_ENUMERATIONS, ENUMERATION, instance_set_enumerations(c, vr, n, values));
 }
 
 /* There are no variables of these types: an empty list is fine. */
-static fmi3Status none_of(fmi3Instance instance, const char *call, const char *kind, const fmi3ValueReference vr[],
+static fmi3Status none_of(struct instance *c, const char *name, const char *kind, const fmi3ValueReference vr[],
                           size_t n, size_t n_values)
 {
-    struct component *c = instance;
-    if (!is_list(c, call, vr, n, vr, n_values))
+    if (!permitted_always(c, name, n == 0 || vr) || !is_list(c, name, n, n_values))
         return fmi3Error;
-    return n == 0 ? fmi3OK : status_of(instance_no_such(&c->instance, kind, vr[0]));
+    return status_of(instance_none_of(c, name, kind, vr, n));
 }
 
 #define NONE_OF(Type)                                                                                                  \
-    fmi3Status fmi3Get##Type(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, fmi3##Type values[],      \
+    fmi3Status fmi3Get##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3##Type values[],             \
                              size_t n_values)                                                                          \
     {                                                                                                                  \
-        (void)values;                                                                                                  \
-        return none_of(instance, "fmi3Get" #Type, #Type, vr, n, n_values);                                             \
+        return none_of(c, "fmi3Get" #Type, #Type, vr, n, n_values);                                                    \
     }                                                                                                                  \
-    fmi3Status fmi3Set##Type(fmi3Instance instance, const fmi3ValueReference vr[], size_t n,                           \
-                             const fmi3##Type values[], size_t n_values)                                               \
+    fmi3Status fmi3Set##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3##Type values[],       \
+                             size_t n_values)                                                                          \
     {                                                                                                                  \
-        (void)values;                                                                                                  \
-        return none_of(instance, "fmi3Set" #Type, #Type, vr, n, n_values);                                             \
+        return none_of(c, "fmi3Set" #Type, #Type, vr, n, n_values);                                                    \
     }
 
 NONE_OF(Float32)
@@ -285,207 +270,117 @@ NONE_OF(UInt64)
 NONE_OF(Boolean)
 NONE_OF(String)
 
-fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, size_t sizes[],
-                         fmi3Binary values[], size_t n_values)
+fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n, size_t sizes[], fmi3Binary values[],
+                         size_t n_values)
 {
-    (void)sizes, (void)values;
-    return none_of(instance, "fmi3GetBinary", "Binary", vr, n, n_values);
+    return none_of(c, "fmi3GetBinary", "Binary", vr, n, n_values);
 }
 
-fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, const size_t sizes[],
+fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const size_t sizes[],
                          const fmi3Binary values[], size_t n_values)
 {
-    (void)sizes, (void)values;
-    return none_of(instance, "fmi3SetBinary", "Binary", vr, n, n_values);
+    return none_of(c, "fmi3SetBinary", "Binary", vr, n, n_values);
 }
 
 /* ---- clocks: there are none */
 
-fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, fmi3Clock values[])
-{
-    (void)values;
-    return none_of(instance, "fmi3GetClock", "Clock", vr, n, n);
-}
+#define NO_CLOCKS(Call, ...)                                                                                           \
+    fmi3Status fmi3##Call(fmi3Instance c, const fmi3ValueReference vr[], size_t n, __VA_ARGS__)                        \
+    {                                                                                                                  \
+        return none_of(c, "fmi3" #Call, "Clock", vr, n, n);                                                            \
+    }
 
-fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, const fmi3Clock values[])
-{
-    (void)values;
-    return none_of(instance, "fmi3SetClock", "Clock", vr, n, n);
-}
-
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference vr[], size_t n,
-                                  fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
-{
-    (void)intervals, (void)qualifiers;
-    return none_of(instance, "fmi3GetIntervalDecimal", "Clock", vr, n, n);
-}
-
-fmi3Status fmi3GetIntervalFraction(fmi3Instance instance, const fmi3ValueReference vr[], size_t n,
-                                   fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
-{
-    (void)counters, (void)resolutions, (void)qualifiers;
-    return none_of(instance, "fmi3GetIntervalFraction", "Clock", vr, n, n);
-}
-
-fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, fmi3Float64 shifts[])
-{
-    (void)shifts;
-    return none_of(instance, "fmi3GetShiftDecimal", "Clock", vr, n, n);
-}
-
-fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference vr[], size_t n, fmi3UInt64 counters[],
-                                fmi3UInt64 resolutions[])
-{
-    (void)counters, (void)resolutions;
-    return none_of(instance, "fmi3GetShiftFraction", "Clock", vr, n, n);
-}
-
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference vr[], size_t n,
-                                  const fmi3Float64 intervals[])
-{
-    (void)intervals;
-    return none_of(instance, "fmi3SetIntervalDecimal", "Clock", vr, n, n);
-}
-
-fmi3Status fmi3SetIntervalFraction(fmi3Instance instance, const fmi3ValueReference vr[], size_t n,
-                                   const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-{
-    (void)counters, (void)resolutions;
-    return none_of(instance, "fmi3SetIntervalFraction", "Clock", vr, n, n);
-}
-
-fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference vr[], size_t n,
-                               const fmi3Float64 shifts[])
-{
-    (void)shifts;
-    return none_of(instance, "fmi3SetShiftDecimal", "Clock", vr, n, n);
-}
-
-fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference vr[], size_t n,
-                                const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-{
-    (void)counters, (void)resolutions;
-    return none_of(instance, "fmi3SetShiftFraction", "Clock", vr, n, n);
-}
+NO_CLOCKS(GetClock, fmi3Clock values[])
+NO_CLOCKS(SetClock, const fmi3Clock values[])
+NO_CLOCKS(GetIntervalDecimal, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+NO_CLOCKS(GetIntervalFraction, fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
+NO_CLOCKS(GetShiftDecimal, fmi3Float64 shifts[])
+NO_CLOCKS(GetShiftFraction, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+NO_CLOCKS(SetIntervalDecimal, const fmi3Float64 intervals[])
+NO_CLOCKS(SetIntervalFraction, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+NO_CLOCKS(SetShiftDecimal, const fmi3Float64 shifts[])
+NO_CLOCKS(SetShiftFraction, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 
 /* ---- what the description says this FMU has not got */
 
-fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference vr, size_t *n)
+fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n)
 {
-    (void)vr, (void)n;
-    return refuse(instance, "fmi3GetNumberOfVariableDependencies", "providesPerElementDependencies is false");
+    return refuse(c, "fmi3GetNumberOfVariableDependencies", "providesPerElementDependencies is false");
 }
 
-fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent, size_t elements[],
+fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent, size_t elements[],
                                        fmi3ValueReference independents[], size_t elements_of_independents[],
                                        fmi3DependencyKind kinds[], size_t n)
 {
-    (void)dependent, (void)elements, (void)independents, (void)elements_of_independents, (void)kinds, (void)n;
-    return refuse(instance, "fmi3GetVariableDependencies", "providesPerElementDependencies is false");
+    return refuse(c, "fmi3GetVariableDependencies", "providesPerElementDependencies is false");
 }
 
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance c)
 {
-    return refuse(instance, "fmi3EnterConfigurationMode", "there are no structural parameters");
+    return refuse(c, "fmi3EnterConfigurationMode", "there are no structural parameters");
 }
 
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance c)
 {
-    return refuse(instance, "fmi3ExitConfigurationMode", "there are no structural parameters");
+    return refuse(c, "fmi3ExitConfigurationMode", "there are no structural parameters");
 }
 
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c)
 {
-    return refuse(instance, "fmi3EvaluateDiscreteStates", "providesEvaluateDiscreteStates is false");
+    return refuse(c, "fmi3EvaluateDiscreteStates", "providesEvaluateDiscreteStates is false");
 }
 
-fmi3Status fmi3EnterStepMode(fmi3Instance instance)
+fmi3Status fmi3EnterStepMode(fmi3Instance c)
 {
-    return refuse(instance, "fmi3EnterStepMode", "hasEventMode is false");
+    return refuse(c, "fmi3EnterStepMode", "hasEventMode is false");
 }
 
-fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time)
+fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time)
 {
-    (void)clock, (void)time;
-    return refuse(instance, "fmi3ActivateModelPartition", "there is no ScheduledExecution in modelDescription.xml");
+    return refuse(c, "fmi3ActivateModelPartition", "there is no ScheduledExecution in modelDescription.xml");
 }
 
 /* ---- FMU state */
 
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *state)
+fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
 {
-    struct component *c = instance;
-    if (!c || !state)
-        return refuse_null(c, "fmi3GetFMUState");
-    if (!*state) /* else it is one from before, to be used again */
-        *state = memory_allocate(1, sizeof(struct content));
-    if (!*state)
-        return refuse(c, "fmi3GetFMUState", "no memory");
-    *(struct content *)*state = c->instance.now;
-    return fmi3OK;
+    return STATUS_OF(GET_FMU_STATE, state, instance_save(c, state));
 }
 
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState state)
+fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
 {
-    struct component *c = instance;
-    if (!c || !state)
-        return refuse_null(c, "fmi3SetFMUState");
-    return status_of(instance_restore(&c->instance, state));
+    return STATUS_OF(SET_FMU_STATE, state, instance_restore(c, state));
 }
 
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *state)
+fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
 {
-    if (!instance)
-        return fmi3Error;
-    if (state) {
-        memory_release(*state);
-        *state = NULL;
-    }
-    return fmi3OK;
+    return STATUS_OF(FREE_FMU_STATE, true, instance_forget(c, state));
 }
 
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState state, size_t *size)
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size)
 {
-    if (!instance || !state || !size)
-        return refuse_null(instance, "fmi3SerializedFMUStateSize");
-    *size = instance_serialized_size();
-    return fmi3OK;
+    return STATUS_OF(SIZE_FMU_STATE, state && size, instance_serialized_size(size));
 }
 
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState state, fmi3Byte bytes[], size_t size)
+fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
 {
-    struct component *c = instance;
-    if (!c || !state || !bytes)
-        return refuse_null(c, "fmi3SerializeFMUState");
-    return status_of(instance_serialize(&c->instance, "fmi3SerializeFMUState", state, bytes, size));
+    return STATUS_OF(SERIALIZE_FMU_STATE, state && bytes, instance_serialize(c, state, bytes, size));
 }
 
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
+fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
 {
-    struct component *c = instance;
-    struct content content;
-    if (!c || !bytes || !state)
-        return refuse_null(c, "fmi3DeserializeFMUState");
-    if (instance_deserialize(&c->instance, bytes, size, &content) == REFUSED)
-        return fmi3Error;
-    *state = memory_allocate(1, sizeof content); /* unlike fmi3GetFMUState: what it was may be anything */
-    if (!*state)
-        return refuse(c, "fmi3DeserializeFMUState", "no memory");
-    *(struct content *)*state = content;
-    return fmi3OK;
+    return STATUS_OF(DESERIALIZE_FMU_STATE, bytes && state, instance_deserialize(c, bytes, size, state));
 }
 
 /* ---- co-simulation */
 
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference vr[], size_t n,
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                                     const fmi3Int32 orders[], fmi3Float64 values[], size_t n_values)
 {
-    struct component *c = instance;
-    static const char call[] = "fmi3GetOutputDerivatives";
-    if (!is_list(c, call, vr, n, orders ? (const void *)values : NULL, n_values) ||
-        instance_require_use(&c->instance, call, CO_SIMULATION) == REFUSED)
+    if (!permitted(c, GET_OUTPUT_RATES, n == 0 || (vr && orders && values)) ||
+        !is_list(c, "fmi3GetOutputDerivatives", n, n_values))
         return fmi3Error;
-    return status_of(instance_get_rates(&c->instance, vr, n, orders, values));
+    return status_of(instance_get_rates(c, vr, n, orders, values));
 }
 
 /* The step is made whole or refused: it never returns early, and never ends a run. */
@@ -494,10 +389,9 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 point, fmi3Float64 step
                       fmi3Float64 *last_successful_time)
 {
     struct component *c = instance;
-    (void)no_set_state_before;
-    if (!c || !event_handling_needed || !terminate || !early_return || !last_successful_time)
-        return refuse_null(c, "fmi3DoStep");
-    const enum verdict verdict = instance_step(&c->instance, "fmi3DoStep", point, step);
+    if (!permitted(instance, STEP, event_handling_needed && terminate && early_return && last_successful_time))
+        return fmi3Error;
+    const enum verdict verdict = instance_step(&c->instance, point, step);
     *event_handling_needed = *terminate = *early_return = false;
     *last_successful_time = c->instance.now.time;
     return status_of(verdict);
@@ -505,21 +399,20 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 point, fmi3Float64 step
 
 /* ---- model exchange */
 
-fmi3Status fmi3EnterEventMode(fmi3Instance instance)
+fmi3Status fmi3EnterEventMode(fmi3Instance c)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_enter_event_mode(&c->instance, "fmi3EnterEventMode")) : fmi3Error;
+    return STATUS_OF(ENTER_EVENT_MODE, true, instance_enter_event_mode(c));
 }
 
 /* It has no discrete states: one call is enough. */
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *need_update, fmi3Boolean *terminate,
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *need_update, fmi3Boolean *terminate,
                                     fmi3Boolean *nominals_changed, fmi3Boolean *values_changed,
                                     fmi3Boolean *next_event_defined, fmi3Float64 *next_event)
 {
-    struct component *c = instance;
-    if (!c || !need_update || !terminate || !nominals_changed || !values_changed || !next_event_defined || !next_event)
-        return refuse_null(c, "fmi3UpdateDiscreteStates");
-    const enum verdict verdict = instance_new_discrete_states(&c->instance, "fmi3UpdateDiscreteStates");
+    if (!permitted(c, UPDATE_DISCRETE_STATES, need_update && terminate && nominals_changed && values_changed &&
+                                                  next_event_defined && next_event))
+        return fmi3Error;
+    const enum verdict verdict = instance_update_discrete_states(c);
     if (verdict != REFUSED) {
         *need_update = *terminate = *nominals_changed = *values_changed = *next_event_defined = false;
         *next_event = 0.0;
@@ -527,163 +420,102 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *need_upd
     return status_of(verdict);
 }
 
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_enter_continuous_time(&c->instance, "fmi3EnterContinuousTimeMode")) : fmi3Error;
+    return STATUS_OF(ENTER_CONTINUOUS_TIME, true, instance_enter_continuous_time(c));
 }
 
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean no_set_state_before,
-                                       fmi3Boolean *enter_event_mode, fmi3Boolean *terminate)
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set_state_before, fmi3Boolean *enter_event_mode,
+                                       fmi3Boolean *terminate)
 {
-    struct component *c = instance;
-    (void)no_set_state_before;
-    if (!c || !enter_event_mode || !terminate)
-        return refuse_null(c, "fmi3CompletedIntegratorStep");
     bool event_needed = false;
-    if (instance_completed_integrator_step(&c->instance, "fmi3CompletedIntegratorStep", &event_needed) == REFUSED)
+    if (!permitted(c, COMPLETE_INTEGRATOR_STEP, enter_event_mode && terminate) ||
+        instance_complete_integrator_step(c, &event_needed) == REFUSED)
         return fmi3Error;
     *enter_event_mode = event_needed;
     *terminate = false;
     return fmi3OK;
 }
 
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
+fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_set_time(&c->instance, "fmi3SetTime", time)) : fmi3Error;
+    return STATUS_OF(SET_TIME, true, instance_set_time(c, time));
 }
 
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 states[], size_t n)
+fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 states[], size_t n)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_set_states(&c->instance, "fmi3SetContinuousStates", states, n)) : fmi3Error;
+    return STATUS_OF(SET_STATES, states, instance_set_states(c, states, n));
 }
 
-fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 states[], size_t n)
+fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 states[], size_t n)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_get_states(&c->instance, "fmi3GetContinuousStates", states, n)) : fmi3Error;
+    return STATUS_OF(GET_STATES, states, instance_get_states(c, states, n));
 }
 
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[], size_t n)
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 derivatives[], size_t n)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_get_derivatives(&c->instance, "fmi3GetContinuousStateDerivatives", derivatives, n))
-             : fmi3Error;
+    return STATUS_OF(GET_DERIVATIVES, derivatives, instance_get_derivatives(c, derivatives, n));
 }
 
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t n)
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominals[], size_t n)
 {
-    struct component *c = instance;
-    return c ? status_of(instance_get_nominals(&c->instance, "fmi3GetNominalsOfContinuousStates", nominals, n))
-             : fmi3Error;
+    return STATUS_OF(GET_NOMINALS, nominals, instance_get_nominals(c, nominals, n));
 }
 
-static fmi3Status tell_number(struct component *c, const char *call, size_t *n, size_t number)
+static enum verdict counted(size_t *n, size_t number)
 {
-    if (!c || !n)
-        return refuse_null(c, call);
-    if (instance_require_use(&c->instance, call, MODEL_EXCHANGE) == REFUSED)
-        return fmi3Error;
     *n = number;
-    return fmi3OK;
+    return FINE;
 }
 
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *n)
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n)
 {
-    return tell_number(instance, "fmi3GetNumberOfContinuousStates", n, STATE_COUNT);
+    return STATUS_OF(COUNT_STATES, n, counted(n, STATE_COUNT));
 }
 
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *n)
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n)
 {
-    return tell_number(instance, "fmi3GetNumberOfEventIndicators", n, 0);
+    return STATUS_OF(COUNT_EVENT_INDICATORS, n, counted(n, 0));
 }
 
-/* There are none. */
-fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 indicators[], size_t n)
+fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 indicators[], size_t n)
 {
-    static const char call[] = "fmi3GetEventIndicators";
-    struct component *c = instance;
-    (void)indicators;
-    if (!c || instance_require_use(&c->instance, call, MODEL_EXCHANGE) == REFUSED)
-        return fmi3Error;
-    return n == 0 ? fmi3OK
-                  : status_of(instance_say(&c->instance, REFUSED,
-                                           "%s: %u values: must be 0; there are no event indicators", call,
-                                           (unsigned long long)n));
+    return STATUS_OF(GET_EVENT_INDICATORS, true, instance_get_event_indicators(c, n));
 }
 
 /* ---- partial derivatives, for either use; all variables are scalars */
 
-struct partials {
-    const fmi3ValueReference *unknowns, *knowns;
-    size_t n_unknowns, n_knowns;
-    const fmi3Float64 *seed;
-    fmi3Float64 *sensitivity;
-};
-
-/* Whether a call with these lists can be made; said, where not. There must be a seed for each of the one kind, and
-   a sensitivity for each of the other. */
-static bool is_partials(struct component *c, const char *call, const struct partials *p, size_t n_seed, size_t seeded,
-                        size_t n_sensitivity, size_t sensitive)
+/* Whether there is a seed for each of the one kind, and a sensitivity for each of the other. */
+static bool is_seeded(struct instance *instance, enum call call, size_t n_seed, size_t seeded, size_t n_sensitivity,
+                      size_t sensitive)
 {
-    if (!c)
-        return false;
-    if ((p->n_unknowns > 0 && !p->unknowns) || (p->n_knowns > 0 && !p->knowns) || (seeded > 0 && !p->seed) ||
-        (sensitive > 0 && !p->sensitivity)) {
-        refuse_null(c, call);
-        return false;
-    }
     if (n_seed == seeded && n_sensitivity == sensitive)
         return true;
-    instance_say(&c->instance, REFUSED, "%s: nSeed = %u, nSensitivity = %u: must be %u and %u", call,
+    instance_say(instance, REFUSED, "%s: nSeed = %u, nSensitivity = %u: must be %u and %u", call_name(instance, call),
                  (unsigned long long)n_seed, (unsigned long long)n_sensitivity, (unsigned long long)seeded,
                  (unsigned long long)sensitive);
     return false;
 }
 
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t n_unknowns,
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t n_unknowns,
                                         const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[],
                                         size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity)
 {
-    static const char call[] = "fmi3GetDirectionalDerivative";
-    struct component *c = instance;
-    const struct partials p = {unknowns, knowns, n_unknowns, n_knowns, seed, sensitivity};
-    if (!is_partials(c, call, &p, n_seed, n_knowns, n_sensitivity, n_unknowns))
+    const bool given = (n_unknowns == 0 || (unknowns && sensitivity)) && (n_knowns == 0 || (knowns && seed));
+    if (!permitted(c, DIRECTIONAL_DERIVATIVE, given) ||
+        !is_seeded(c, DIRECTIONAL_DERIVATIVE, n_seed, n_knowns, n_sensitivity, n_unknowns))
         return fmi3Error;
-    return status_of(instance_directional_derivatives(&c->instance, call, unknowns, n_unknowns, knowns, n_knowns, seed,
-                                                      sensitivity));
+    return status_of(
+        instance_directional_derivatives(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
 }
 
-/* The sum over the unknowns of seed[i] * d(unknown i)/d(known). */
-static double adjoint(const struct linearization *linearization, const struct partials *p, fmi3ValueReference known)
-{
-    double sum = 0.0;
-    for (size_t i = 0; i < p->n_unknowns; i++)
-        sum += p->seed[i] * instance_partial(linearization, p->unknowns[i], known);
-    return sum;
-}
-
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t n_unknowns,
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t n_unknowns,
                                     const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[],
                                     size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity)
 {
-    static const char call[] = "fmi3GetAdjointDerivative";
-    struct component *c = instance;
-    const struct partials p = {unknowns, knowns, n_unknowns, n_knowns, seed, sensitivity};
-    struct linearization linearization;
-    if (!is_partials(c, call, &p, n_seed, n_unknowns, n_sensitivity, n_knowns) ||
-        instance_linearize(&c->instance, call, unknowns, n_unknowns, knowns, n_knowns, &linearization) == REFUSED)
+    const bool given = (n_unknowns == 0 || (unknowns && seed)) && (n_knowns == 0 || (knowns && sensitivity));
+    if (!permitted(c, ADJOINT_DERIVATIVE, given) ||
+        !is_seeded(c, ADJOINT_DERIVATIVE, n_seed, n_unknowns, n_sensitivity, n_knowns))
         return fmi3Error;
-    for (size_t k = 0; k < n_knowns; k++) {
-        const double value = adjoint(&linearization, &p, knowns[k]);
-        if (!isfinite(value)) /* so are those with a seed that is none */
-            return status_of(instance_say(&c->instance, REFUSED,
-                                          "adjoint derivative of %s = %r: must be a finite number",
-                                          VARIABLES[knowns[k]].name, value));
-    }
-    for (size_t k = 0; k < n_knowns; k++)
-        sensitivity[k] = adjoint(&linearization, &p, knowns[k]);
-    return fmi3OK;
+    return status_of(instance_adjoint_derivatives(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
 }

@@ -1,8 +1,12 @@
 #include "linearization.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "trig.h"
+
+/* Below each number of the craft is differentiated by hand. */
+_Static_assert(CRAFT_REAL_COUNT == 14, "change_of_derived and change_of_craft follow every number of struct craft");
 
 /* What all columns share; the names are those of the loads in kernel.c. */
 struct point {
@@ -174,20 +178,15 @@ static void parameters_at(struct point p, struct linearization *linearization)
     const double x = loads.x / craft->mass, y = loads.y / craft->mass, yaw = loads.moment / craft->inertia;
     if (craft->skirt_friction == 0.0 && skirt_at(&p) == 0.0)
         slip_at(&p, x, y, p.skirt.radius * yaw);
-    for (int known = 0; known < KNOWN_COUNT; known++)
-        linearization->of[PROJECTED_AREA][known] = 0.0;
     for (int known = KNOWN_COUNT; known < INITIAL_KNOWN_COUNT; known++) {
-        double d[INITIAL_KNOWN_COUNT - KNOWN_COUNT] = {0.0};
-        d[known - KNOWN_COUNT] = 1.0;
-        const struct craft d_craft = {d[0], d[1], d[2],  d[3], d[4],  d[5],  d[6], d[7],
-                                      d[8], d[9], d[10], 0,    d[11], d[12], d[13]};
+        struct craft d_craft = {.drag_area = 0};
+        *(double *)(void *)((char *)&d_craft + CRAFT_REALS[known - KNOWN_COUNT]) = 1.0;
         const struct derived derived = change_of_derived(craft, &d_craft);
         const struct loads d_loads = change_of_craft(&p, &held, &d_craft, &derived);
-        linearization->of[SURGE][known] = linearization->of[SWAY][known] = linearization->of[SPEED][known] = 0.0;
-        linearization->of[ACCELERATION_X][known] = (d_loads.x - d_craft.mass * x) / craft->mass;
-        linearization->of[ACCELERATION_Y][known] = (d_loads.y - d_craft.mass * y) / craft->mass;
-        linearization->of[ACCELERATION_YAW][known] = (d_loads.moment - d_craft.inertia * yaw) / craft->inertia;
-        linearization->of[PROJECTED_AREA][known] = derived.projected_area;
+        linearization->of[ROW_ACCELERATION_X][known] = (d_loads.x - d_craft.mass * x) / craft->mass;
+        linearization->of[ROW_ACCELERATION_Y][known] = (d_loads.y - d_craft.mass * y) / craft->mass;
+        linearization->of[ROW_ACCELERATION_YAW][known] = (d_loads.moment - d_craft.inertia * yaw) / craft->inertia;
+        linearization->of[ROW_PROJECTED_AREA][known] = derived.projected_area;
     }
 }
 
@@ -196,27 +195,30 @@ static void motion_at(const struct point *p, struct linearization *linearization
     const struct state *state = p->state;
     const double speed = sqrt(state->vx * state->vx + state->vy * state->vy);
     const double surge = p->c * state->vx + p->s * state->vy, sway = p->c * state->vy - p->s * state->vx;
-    const double rows[ACCELERATION_X][KNOWN_COUNT] = {
-        [SURGE] = {0.0, 0.0, sway, p->c, p->s},
-        [SWAY] = {0.0, 0.0, -surge, -p->s, p->c},
-        [SPEED] = {0.0, 0.0, 0.0, speed > 0.0 ? state->vx / speed : 0.0, speed > 0.0 ? state->vy / speed : 0.0},
-    };
-    for (int row = 0; row < ACCELERATION_X; row++)
-        for (int known = 0; known < KNOWN_COUNT; known++)
-            linearization->of[row][known] = rows[row][known];
+    double (*of)[INITIAL_KNOWN_COUNT] = linearization->of;
+    of[ROW_BODY_SURGE][KNOWN_POSE_HEADING] = sway;
+    of[ROW_BODY_SURGE][KNOWN_VELOCITY_X] = p->c;
+    of[ROW_BODY_SURGE][KNOWN_VELOCITY_Y] = p->s;
+    of[ROW_BODY_SWAY][KNOWN_POSE_HEADING] = -surge;
+    of[ROW_BODY_SWAY][KNOWN_VELOCITY_X] = -p->s;
+    of[ROW_BODY_SWAY][KNOWN_VELOCITY_Y] = p->c;
+    of[ROW_SPEED][KNOWN_VELOCITY_X] = speed > 0.0 ? state->vx / speed : 0.0;
+    of[ROW_SPEED][KNOWN_VELOCITY_Y] = speed > 0.0 ? state->vy / speed : 0.0;
 }
 
 static void accelerations_at(const struct point *p, struct linearization *linearization)
 {
     for (int known = 0; known < KNOWN_COUNT; known++) {
         double d[KNOWN_COUNT] = {0.0};
+        struct state d_state;
+        struct controls d_controls;
         d[known] = 1.0;
-        const struct state d_state = {d[0], d[1], d[2], d[3], d[4], d[5]};
-        const struct controls d_controls = {d[6], d[7], d[8], d[9], d[10]};
+        memcpy(&d_state, d, sizeof d_state);
+        memcpy(&d_controls, d + STATE_COUNT, sizeof d_controls);
         const struct loads loads = change(p, &d_state, &d_controls);
-        linearization->of[ACCELERATION_X][known] = loads.x / p->craft->mass;
-        linearization->of[ACCELERATION_Y][known] = loads.y / p->craft->mass;
-        linearization->of[ACCELERATION_YAW][known] = loads.moment / p->craft->inertia;
+        linearization->of[ROW_ACCELERATION_X][known] = loads.x / p->craft->mass;
+        linearization->of[ROW_ACCELERATION_Y][known] = loads.y / p->craft->mass;
+        linearization->of[ROW_ACCELERATION_YAW][known] = loads.moment / p->craft->inertia;
     }
 }
 
@@ -224,6 +226,7 @@ void kernel_linearize(const struct state *state, const struct controls *controls
                       bool parameters, struct linearization *linearization)
 {
     const struct point p = point_at(state, controls, craft);
+    *linearization = (struct linearization){{{0.0}}};
     motion_at(&p, linearization);
     accelerations_at(&p, linearization);
     if (parameters)

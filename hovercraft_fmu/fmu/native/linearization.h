@@ -3,14 +3,9 @@
 #ifndef HOVERCRAFT_LINEARIZATION_H
 #define HOVERCRAFT_LINEARIZATION_H
 
-#include "kernel.h"
+#include "variables.h"
 
-/* What the derivatives are taken with respect to: the parts of struct state, then those of struct controls, and, at the
-   start, the numbers of struct craft. */
-enum { KNOWN_COUNT = 11, INITIAL_KNOWN_COUNT = 25 };
-/* What they are taken of. */
-enum row { SURGE, SWAY, SPEED, ACCELERATION_X, ACCELERATION_Y, ACCELERATION_YAW, PROJECTED_AREA, ROW_COUNT };
-
+/* d(ROWS)/d(KNOWNS). */
 struct linearization {
     double of[ROW_COUNT][INITIAL_KNOWN_COUNT];
 };

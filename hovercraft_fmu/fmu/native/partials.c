@@ -2,14 +2,8 @@
 
 #include <math.h>
 
-/* Where a reference is in a list, or its length. */
-static unsigned place_in(const unsigned *list, unsigned n, unsigned reference)
-{
-    unsigned i = 0;
-    while (i < n && list[i] != reference)
-        i++;
-    return i;
-}
+/* Nothing follows a parameter of the steps at once, and there are two; all else that is given is a known of ROWS. */
+_Static_assert(GIVEN_REAL_COUNT == INITIAL_KNOWN_COUNT + 2, "a parameter is a number of the craft, or of the steps");
 
 /* The standard's knowns: in initialization mode the inputs, and every Real that is given exactly: states, parameters;
    later the inputs and the states. */
@@ -17,7 +11,7 @@ static bool is_known(enum phase phase, unsigned reference)
 {
     if (phase == INITIALIZING)
         return reference < VARIABLE_COUNT && VARIABLES[reference].kind == REAL && VARIABLES[reference].start_given;
-    return place_in(KNOWNS, KNOWN_COUNT, reference) < KNOWN_COUNT;
+    return instance_place(KNOWNS, KNOWN_COUNT, reference) < KNOWN_COUNT;
 }
 
 /* And its unknowns: in initialization mode those that are calculated then; later states and their derivatives, and what
@@ -25,34 +19,35 @@ static bool is_known(enum phase phase, unsigned reference)
 static bool is_unknown(enum phase phase, unsigned reference)
 {
     if (phase == INITIALIZING)
-        return place_in(ROWS, ROW_COUNT, reference) < ROW_COUNT;
-    return place_in(STATES, STATE_COUNT, reference) < STATE_COUNT ||
-           place_in(DERIVATIVES, STATE_COUNT, reference) < STATE_COUNT ||
-           place_in(MOTION, MOTION_COUNT, reference) < MOTION_COUNT;
+        return instance_place(ROWS, ROW_COUNT, reference) < ROW_COUNT;
+    return instance_place(STATES, STATE_COUNT, reference) < STATE_COUNT ||
+           instance_place(DERIVATIVES, STATE_COUNT, reference) < STATE_COUNT ||
+           instance_place(MOTION, MOTION_COUNT, reference) < MOTION_COUNT;
 }
 
-static enum verdict refuse(struct instance *instance, const char *call, unsigned reference, const char *what,
+static enum verdict refuse_reference(struct instance *instance, enum call call, unsigned reference, const char *what,
                            const char *rule)
 {
     if (reference < VARIABLE_COUNT)
-        return instance_say(instance, REFUSED, "%s: %s %s: %s", call, what, VARIABLES[reference].name, rule);
-    return instance_say(instance, REFUSED, "%s: %s with value reference %u: %s", call, what,
+        return instance_say(instance, REFUSED, "%s: %s %s: %s", call_name(instance, call), what,
+                            VARIABLES[reference].name, rule);
+    return instance_say(instance, REFUSED, "%s: %s with value reference %u: %s", call_name(instance, call), what,
                         (unsigned long long)reference, rule);
 }
 
-static enum verdict check_references(struct instance *instance, const char *call, const unsigned *unknowns,
+static enum verdict check_references(struct instance *instance, enum call call, const unsigned *unknowns,
                                      size_t n_unknowns, const unsigned *knowns, size_t n_knowns)
 {
     const enum phase phase = instance->now.phase;
     const bool initial = phase == INITIALIZING;
     for (size_t i = 0; i < n_unknowns; i++)
         if (!is_unknown(phase, unknowns[i]))
-            return refuse(instance, call, unknowns[i], "unknown",
+            return refuse_reference(instance, call, unknowns[i], "unknown",
                           initial ? "must be one of the initial unknowns in initialization mode"
                                   : "must be an output or the derivative of a state after initialization mode");
     for (size_t k = 0; k < n_knowns; k++)
         if (!is_known(phase, knowns[k]))
-            return refuse(instance, call, knowns[k], "known",
+            return refuse_reference(instance, call, knowns[k], "known",
                           initial ? "must be a state, an input or a real parameter in initialization mode"
                                   : "must be a state or an input after initialization mode");
     return FINE;
@@ -62,45 +57,43 @@ static enum verdict check_references(struct instance *instance, const char *call
 static bool is_accelerated(const unsigned *unknowns, size_t n_unknowns)
 {
     for (size_t i = 0; i < n_unknowns; i++) {
-        const unsigned row = place_in(ROWS, ROW_COUNT, unknowns[i]);
-        if (row >= ACCELERATION_X && row <= ACCELERATION_YAW)
+        const unsigned row = instance_place(ROWS, ROW_COUNT, unknowns[i]);
+        if (row >= ROW_ACCELERATION_X && row <= ROW_ACCELERATION_YAW)
             return true;
     }
     return false;
 }
 
-static bool is_held(const struct content *content)
+static bool is_stuck(const struct content *content)
 {
     const struct state *s = &content->state;
     return content->craft.skirt_friction != 0.0 && s->vx == 0.0 && s->vy == 0.0 && s->yaw_rate == 0.0;
 }
 
-double instance_partial(const struct linearization *linearization, unsigned unknown, unsigned known)
+/* d(unknown)/d(known), of references that were not refused. */
+static double partial(const struct linearization *linearization, unsigned unknown, unsigned known)
 {
-    const unsigned row = place_in(ROWS, ROW_COUNT, unknown);
-    const unsigned column = place_in(KNOWNS, INITIAL_KNOWN_COUNT, known);
+    const unsigned row = instance_place(ROWS, ROW_COUNT, unknown);
+    const unsigned column = instance_place(KNOWNS, INITIAL_KNOWN_COUNT, known);
     if (row < ROW_COUNT && column < INITIAL_KNOWN_COUNT)
         return linearization->of[row][column];
-    return unknown == known ? 1.0 : 0.0; /* of states, or velocities; nothing else follows a parameter of the steps */
+    return unknown == known ? 1.0 : 0.0; /* of states, or velocities */
 }
 
-enum verdict instance_linearize(struct instance *instance, const char *call, const unsigned *unknowns,
-                                size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
-                                struct linearization *linearization)
+static enum verdict linearize(struct instance *instance, enum call call, const unsigned *unknowns, size_t n_unknowns,
+                              const unsigned *knowns, size_t n_knowns, struct linearization *linearization)
 {
     const struct content *now = &instance->now;
-    if (now->phase == INSTANTIATED)
-        return instance_require(instance, call, INITIALIZING);
     if (check_references(instance, call, unknowns, n_unknowns, knowns, n_knowns) == REFUSED ||
         instance_get_reals(instance, NULL, 0, NULL) == REFUSED) /* all is up to date after that */
         return REFUSED;
-    if (is_held(now) && is_accelerated(unknowns, n_unknowns))
+    if (is_stuck(now) && is_accelerated(unknowns, n_unknowns))
         return instance_say(instance, REFUSED, "%s: the craft is at rest on ground that rubs: it must slide to have "
-                                               "partial derivatives", call);
+                                               "partial derivatives", call_name(instance, call));
     kernel_linearize(&now->state, &now->controls, &now->craft, now->phase == INITIALIZING, linearization);
     for (size_t i = 0; i < n_unknowns; i++)
         for (size_t k = 0; k < n_knowns; k++) {
-            const double value = instance_partial(linearization, unknowns[i], knowns[k]);
+            const double value = partial(linearization, unknowns[i], knowns[k]);
             if (!isfinite(value))
                 return instance_say(instance, REFUSED,
                                     "derivative of %s with respect to %s = %r: must be a finite number; the motion is "
@@ -110,29 +103,57 @@ enum verdict instance_linearize(struct instance *instance, const char *call, con
     return FINE;
 }
 
-static double product(const struct linearization *linearization, unsigned unknown, const unsigned *knowns,
+/* The sum over the knowns of seeds[k] * d(unknown)/d(known k). */
+static double directional(const struct linearization *linearization, unsigned unknown, const unsigned *knowns,
                       size_t n_knowns, const double *seeds)
 {
     double sum = 0.0;
     for (size_t k = 0; k < n_knowns; k++)
-        sum += instance_partial(linearization, unknown, knowns[k]) * seeds[k];
+        sum += partial(linearization, unknown, knowns[k]) * seeds[k];
     return sum;
 }
 
-enum verdict instance_directional_derivatives(struct instance *instance, const char *call, const unsigned *unknowns,
+enum verdict instance_directional_derivatives(struct instance *instance, const unsigned *unknowns,
                                               size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
                                               const double *seeds, double *values)
 {
     struct linearization linearization;
-    if (instance_linearize(instance, call, unknowns, n_unknowns, knowns, n_knowns, &linearization) == REFUSED)
+    if (linearize(instance, DIRECTIONAL_DERIVATIVE, unknowns, n_unknowns, knowns, n_knowns, &linearization) == REFUSED)
         return REFUSED;
     for (size_t i = 0; i < n_unknowns; i++) {
-        const double value = product(&linearization, unknowns[i], knowns, n_knowns, seeds);
+        const double value = directional(&linearization, unknowns[i], knowns, n_knowns, seeds);
         if (!isfinite(value)) /* so are those with a seed that is none */
             return instance_say(instance, REFUSED, "directional derivative of %s = %r: must be a finite number",
                                 VARIABLES[unknowns[i]].name, value);
     }
     for (size_t i = 0; i < n_unknowns; i++)
-        values[i] = product(&linearization, unknowns[i], knowns, n_knowns, seeds);
+        values[i] = directional(&linearization, unknowns[i], knowns, n_knowns, seeds);
+    return FINE;
+}
+
+/* The sum over the unknowns of seeds[i] * d(unknown i)/d(known). */
+static double adjoint(const struct linearization *linearization, const unsigned *unknowns, size_t n_unknowns,
+                      unsigned known, const double *seeds)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < n_unknowns; i++)
+        sum += seeds[i] * partial(linearization, unknowns[i], known);
+    return sum;
+}
+
+enum verdict instance_adjoint_derivatives(struct instance *instance, const unsigned *unknowns, size_t n_unknowns,
+                                          const unsigned *knowns, size_t n_knowns, const double *seeds, double *values)
+{
+    struct linearization linearization;
+    if (linearize(instance, ADJOINT_DERIVATIVE, unknowns, n_unknowns, knowns, n_knowns, &linearization) == REFUSED)
+        return REFUSED;
+    for (size_t k = 0; k < n_knowns; k++) {
+        const double value = adjoint(&linearization, unknowns, n_unknowns, knowns[k], seeds);
+        if (!isfinite(value)) /* so are those with a seed that is none */
+            return instance_say(instance, REFUSED, "adjoint derivative of %s = %r: must be a finite number",
+                                VARIABLES[knowns[k]].name, value);
+    }
+    for (size_t k = 0; k < n_knowns; k++)
+        values[k] = adjoint(&linearization, unknowns, n_unknowns, knowns[k], seeds);
     return FINE;
 }

@@ -60,23 +60,16 @@ static void exchange_doubles(struct cursor *cursor, void *first, size_t bytes)
 
 static bool is_state(unsigned reference)
 {
-    for (unsigned i = 0; i < STATE_COUNT; i++)
-        if (STATES[i] == reference)
-            return true;
-    return false;
+    return instance_place(STATES, STATE_COUNT, reference) < STATE_COUNT;
 }
 
 /* Before the start the state is what the host has set. */
 static void exchange_state(struct cursor *cursor, struct content *c)
 {
-    double *const parts[STATE_COUNT] = {&c->state.x,  &c->state.y,  &c->state.heading,
-                                        &c->state.vx, &c->state.vy, &c->state.yaw_rate};
-    const bool started = instance_has_started(c);
-    for (unsigned i = 0; i < STATE_COUNT; i++) {
-        double value = started ? *parts[i] : c->reals[STATES[i]];
-        exchange_double(cursor, &value);
-        *parts[i] = c->reals[STATES[i]] = value;
-    }
+    if (!instance_has_started(c))
+        instance_copy(&c->state, c->reals, STATES, STATE_COUNT);
+    exchange_doubles(cursor, &c->state, sizeof c->state);
+    instance_spread(c->reals, &c->state, STATES, STATE_COUNT);
 }
 
 static void exchange_craft(struct cursor *cursor, struct craft *craft)
@@ -121,7 +114,7 @@ static void exchange(struct cursor *cursor, struct content *c)
     c->tuned = tuned != 0;
 }
 
-size_t instance_serialized_size(void)
+static size_t serialized_size(void)
 {
     struct content content = {.phase = INSTANTIATED};
     struct cursor cursor = {MEASURE, NULL, NULL, HEAD_SIZE};
@@ -137,15 +130,16 @@ static uint64_t checksum(const unsigned char *bytes, size_t n)
     return sum;
 }
 
-enum verdict instance_serialize(struct instance *instance, const char *call, const struct content *content,
-                                unsigned char *bytes, size_t size)
+enum verdict instance_serialize(struct instance *instance, const struct content *content, unsigned char *bytes,
+                                size_t size)
 {
     struct content copy = *content;
     struct cursor cursor = {WRITE, bytes, NULL, MAGIC_SIZE};
     int32_t version = VERSION;
-    if (size < instance_serialized_size())
-        return instance_say(instance, REFUSED, "%s: size = %u: must be %u bytes", call, (unsigned long long)size,
-                            (unsigned long long)instance_serialized_size());
+    if (size < serialized_size())
+        return instance_say(instance, REFUSED, "%s: size = %u: must be %u bytes",
+                            call_name(instance, SERIALIZE_FMU_STATE), (unsigned long long)size,
+                            (unsigned long long)serialized_size());
     memcpy(bytes, MAGIC, MAGIC_SIZE);
     exchange_integer(&cursor, &version);
     memcpy(bytes + cursor.at, BUILD, BUILD_SIZE);
@@ -171,7 +165,7 @@ static bool is_of_this_build(const unsigned char *bytes, size_t size)
     struct cursor cursor = {READ, NULL, bytes, MAGIC_SIZE};
     int32_t version = 0;
     exchange_integer(&cursor, &version);
-    return version == VERSION && size == instance_serialized_size() &&
+    return version == VERSION && size == serialized_size() &&
            memcmp(bytes + cursor.at, BUILD, BUILD_SIZE) == 0;
 }
 
@@ -189,13 +183,14 @@ static bool is_possible(const struct content *c)
     const bool started = instance_has_started(c);
     const int32_t kept = c->integers[V_INTEGRATOR], used = c->settings.integrator;
     const int32_t number = c->integers[V_INTEGRATOR_NUMBER];
-    return is_phase_of_use(c) && kept >= 1 && kept <= most && number >= 0 && number <= most && (!started || (used >= 1 && used <= most)) &&
-           c->reals[V_STEP_SIZE] > 0.0 && (!started || c->settings.step_size > 0.0) && c->integers[V_SUBSTEPS] >= 0 &&
+    return is_phase_of_use(c) && kept >= 1 && kept <= most && number >= 0 && number <= most &&
+           (!started || (used >= 1 && used <= most)) && c->reals[V_STEP_SIZE] > 0.0 &&
+           (!started || c->settings.step_size > 0.0) && c->integers[V_SUBSTEPS] >= 0 &&
            (c->use == CO_SIMULATION || (c->reals[V_SKIRT_FRICTION] == 0.0 && c->craft.skirt_friction == 0.0));
 }
 
-enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
-                                  struct content *content)
+static enum verdict deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
+                                struct content *content)
 {
     struct cursor cursor = {READ, NULL, bytes, HEAD_SIZE};
     char build[BUILD_SIZE + 1] = "";
@@ -213,5 +208,22 @@ enum verdict instance_deserialize(struct instance *instance, const unsigned char
     if (!is_possible(content))
         return instance_say(instance, REFUSED, "serialized FMU state of %u bytes: must be one that this FMU wrote",
                             (unsigned long long)size);
+    return FINE;
+}
+
+enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size, void **state)
+{
+    struct content content;
+    void *made = NULL; /* whatever *state was: it may never have been set */
+    if (deserialize(instance, bytes, size, &content) == REFUSED ||
+        instance_keep(instance, DESERIALIZE_FMU_STATE, &content, &made) == REFUSED)
+        return REFUSED;
+    *state = made;
+    return FINE;
+}
+
+enum verdict instance_serialized_size(size_t *size)
+{
+    *size = serialized_size();
     return FINE;
 }

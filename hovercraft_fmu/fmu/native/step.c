@@ -1,0 +1,217 @@
+#include "instance.h"
+
+#include <math.h>
+#include <string.h>
+
+static enum verdict check_step(struct instance *instance, double point, double step)
+{
+    const double time = instance->now.time, stop_time = instance->now.stop_time;
+    if (!(0.0 < step && step < INFINITY))
+        return instance_say(instance, REFUSED,
+                            "communicationStepSize = %r s: must be a finite number greater than 0", step);
+    if (point != time && !(fabs(point - time) <= SAME_TIME * larger(1.0, fabs(time))))
+        return instance_say(instance, REFUSED,
+                            "currentCommunicationPoint = %r s: must be where the last step ended, %r s", point, time);
+    if (point + step - stop_time > SAME_TIME * larger(1.0, fabs(stop_time)))
+        return instance_say(instance, REFUSED,
+                            "communicationStepSize = %r s from %r s: must not lead past stopTime = %r s", step, point,
+                            stop_time);
+    return FINE;
+}
+
+/* Of what is not finite the velocities are told first: it is they that run away first. */
+static enum verdict refuse_motion(struct instance *instance, const struct stretch *stretch)
+{
+    double parts[STATE_COUNT];
+    unsigned n = 0, i = STATE_COUNT / 2;
+    memcpy(parts, &stretch->state, sizeof parts);
+    while (n + 1 < STATE_COUNT && isfinite(parts[i]))
+        i = (++n + STATE_COUNT / 2) % STATE_COUNT;
+    return instance_say(instance, REFUSED,
+                        "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
+                        "stands; the motion is too fast for sub-steps of %r s: set a smaller step_size",
+                        VARIABLES[STATES[i]].name, parts[i], instance->now.time, instance->now.time,
+                        stretch->substep);
+}
+
+static enum verdict refuse_step(struct instance *instance, enum outcome outcome, double step,
+                                const struct stretch *stretch)
+{
+    const struct settings *settings = &instance->now.settings;
+    if (outcome == TOO_MANY_SUBSTEPS)
+        return instance_say(instance, REFUSED,
+                            "communication step = %r s: must not need more than 10^9 sub-steps of step_size = %r s",
+                            step, settings->step_size);
+    if (outcome == STEP_TOO_SMALL)
+        return instance_say(instance, REFUSED,
+                            "step = %r s: must not fall below 1e-12 s to meet tolerance = %r; set a larger tolerance",
+                            stretch->substep, settings->tolerance);
+    return refuse_motion(instance, stretch);
+}
+
+/* What is watched over a step may overflow where the motion just does not; an infinite rotation leaves no finite
+   stability number. */
+static enum verdict check_watched(struct instance *instance, double stability, double rotation)
+{
+    const bool turns = !isfinite(rotation);
+    const double time = instance->now.time;
+    if (isfinite(stability))
+        return FINE;
+    return instance_say(instance, REFUSED,
+                        "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
+                        "stands; the motion is too fast for sub-steps of %r s: set a smaller step_size",
+                        VARIABLES[turns ? V_ROTATION_PER_SUBSTEP : V_STABILITY_NUMBER].name,
+                        turns ? rotation : stability, time, time, instance->now.settings.step_size);
+}
+
+/* Whether this warning was not yet given; then it is, now. */
+static bool is_first(struct instance *instance, int bit)
+{
+    const bool first = !(instance->now.integers[V_WARNINGS] & bit);
+    instance->now.integers[V_WARNINGS] |= bit;
+    return first;
+}
+
+static bool is_held(double value, double limit)
+{
+    return fabs(value - limit) > HELD * larger(1.0, fabs(limit));
+}
+
+static const struct method *method_of(const struct instance *instance)
+{
+    return &METHODS[instance->now.settings.integrator - 1];
+}
+
+static enum verdict warn_of_the_step(struct instance *instance)
+{
+    const struct content *now = &instance->now;
+    const struct method *method = method_of(instance);
+    const double number = now->stability, rotation = now->rotation;
+    enum verdict verdict = FINE;
+    if (number > method->stability_limit && is_first(instance, STEP_UNSTABLE))
+        verdict = instance_say(instance, WARNED,
+                               "stability_number = %4: must not pass %r with %s; set a step_size below %3 s, or "
+                               "another integrator (said once)",
+                               number, method->stability_limit, method->name,
+                               now->settings.step_size * method->stability_limit / number);
+    if (rotation > method->rotation_limit && is_first(instance, STEP_TURNS))
+        verdict = instance_say(instance, WARNED,
+                               "rotation_per_substep = %4 rad: must not pass %r rad; set a step_size below %3 s, or "
+                               "the integrator adaptive (said once)",
+                               rotation, method->rotation_limit,
+                               now->settings.step_size * method->rotation_limit / rotation);
+    return verdict;
+}
+
+/* An input that is outside its limits, and where it is held. */
+struct held {
+    unsigned input; /* INPUT_COUNT: none */
+    double value, limit;
+};
+
+static struct held held_input(const struct controls *controls, const struct craft *craft)
+{
+    const struct controls limits = kernel_saturate(controls, craft);
+    double values[INPUT_COUNT], held[INPUT_COUNT];
+    memcpy(values, controls, sizeof values);
+    memcpy(held, &limits, sizeof held);
+    for (unsigned i = 0; i < INPUT_COUNT; i++)
+        if (is_held(values[i], held[i]))
+            return (struct held){i, values[i], held[i]};
+    return (struct held){.input = INPUT_COUNT};
+}
+
+enum verdict instance_warn_of_held_inputs(struct instance *instance, const struct controls *controls)
+{
+    const struct held held = held_input(controls, &instance->now.craft);
+    if (held.input == INPUT_COUNT || !is_first(instance, INPUT_HELD))
+        return FINE;
+    return instance_say(instance, WARNED, "%s = %r: is outside its limits and is held at %r (said once)",
+                        VARIABLES[INPUTS[held.input]].name, held.value, held.limit);
+}
+
+bool instance_has_to_warn(const struct instance *instance)
+{
+    return !(instance->now.integers[V_WARNINGS] & INPUT_HELD) &&
+           held_input(&instance->now.controls, &instance->now.craft).input < INPUT_COUNT;
+}
+
+static enum verdict count_substeps(struct instance *instance, int64_t n)
+{
+    int32_t *count = &instance->now.integers[V_SUBSTEPS];
+    if (n <= SUBSTEPS_MAX - (int64_t)*count) {
+        *count += (int32_t)n;
+        return FINE;
+    }
+    *count = SUBSTEPS_MAX;
+    if (!is_first(instance, COUNTER_STOPPED))
+        return FINE;
+    return instance_say(instance, WARNED, "substeps = %i: %s (said once)", (long long)SUBSTEPS_MAX,
+                        COUNTER_STOPPED_TEXT);
+}
+
+static enum verdict worse(enum verdict a, enum verdict b)
+{
+    return a > b ? a : b;
+}
+
+/* The inputs over the step. Refused: a ramp that leaves the range of numbers. */
+static enum verdict make_drive(struct instance *instance, double step, struct drive *drive, struct controls *end)
+{
+    const double *rates = instance->now.rates;
+    double ends[INPUT_COUNT];
+    bool finite = true;
+    instance_copy(&drive->start, instance->now.reals, INPUTS, INPUT_COUNT);
+    memcpy(&drive->rate, rates, sizeof drive->rate);
+    drive->ramped = false;
+    for (unsigned i = 0; i < INPUT_COUNT; i++)
+        drive->ramped = drive->ramped || rates[i] != 0.0;
+    *end = kernel_controls_at(drive, step);
+    memcpy(ends, end, sizeof ends);
+    for (unsigned i = 0; i < INPUT_COUNT; i++)
+        finite = finite && isfinite(ends[i]);
+    if (finite)
+        return FINE;
+    return instance_say(instance, REFUSED, "input derivatives over %r s: must lead to finite inputs", step);
+}
+
+static enum verdict take_step(struct instance *instance, double point, double step)
+{
+    struct content *now = &instance->now;
+    struct drive drive;
+    struct controls end;
+    struct craft craft = now->craft;
+    struct stretch stretch = {.substeps = 0};
+    if (check_step(instance, point, step) == REFUSED)
+        return REFUSED;
+    if (now->tuned && instance_make_craft(instance, &craft) == REFUSED)
+        return REFUSED;
+    if (make_drive(instance, step, &drive, &end) == REFUSED)
+        return REFUSED;
+    const enum outcome outcome =
+        kernel_advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
+    if (outcome != ADVANCED)
+        return refuse_step(instance, outcome, step, &stretch);
+    const double stability = kernel_stability_number(stretch.drag_mass, stretch.rotation, &craft);
+    if (check_watched(instance, stability, stretch.rotation) == REFUSED)
+        return REFUSED;
+    now->state = stretch.state;
+    now->proposed = stretch.proposed;
+    now->controls = end;
+    now->craft = craft;
+    now->tuned = false;
+    now->time = point + step;
+    now->motion_unread = now->action_unread = true;
+    now->stability = larger(now->stability, stability);
+    now->rotation = larger(now->rotation, stretch.rotation);
+    instance_spread(now->reals, &end, INPUTS, INPUT_COUNT); /* a ramp goes on from here */
+    enum verdict verdict = count_substeps(instance, stretch.substeps);
+    verdict = worse(verdict, warn_of_the_step(instance));
+    verdict = worse(verdict, instance_warn_of_held_inputs(instance, &drive.start));
+    return worse(verdict, instance_warn_of_held_inputs(instance, &end));
+}
+
+enum verdict instance_step(struct instance *instance, double point, double step)
+{
+    return instance->last_step = take_step(instance, point, step);
+}
