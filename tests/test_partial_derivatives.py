@@ -86,7 +86,7 @@ def _model(values: dict[str, Any], drag_area: int) -> dict[str, Any]:
     craft = object.__new__(Craft)  # complex numbers would not come through its door
     vars(craft).update({name: values[name] for name in PARAMETERS}, drag_area=drag_area)
     state, held = State(*(values[name] for name in STATES)), Controls(*(values[name] for name in INPUTS))
-    loads_at = (sliding_load_function if craft.rubs else load_function)(held, craft, COMPLEX)
+    loads_at = (sliding_load_function if craft.rubs else load_function)(held, craft, ns=COMPLEX)
     x, y, moment, _ = loads_at(*state[2:])
     motion = (*body_velocity(state, COMPLEX), np.sqrt(state.vx * state.vx + state.vy * state.vy))
     accelerations = (x / craft.mass, y / craft.mass, moment / craft.inertia)

@@ -75,7 +75,7 @@ class Derivatives(NamedTuple):
 
 
 LoadFunction: TypeAlias = Callable[[float, float, float, float], tuple[float, float, float, float]]
-"""(heading, vx, vy, yaw rate) -> (force x, force y, moment, k*q): the loads, and the drag per air speed [kg/s]."""
+"""(heading, vx, vy, yaw rate) -> (x, y, moment, k*q): loads, times two factors, and the drag per air speed [kg/s]."""
 Friction: TypeAlias = Callable[[float, float, float], tuple[float, float, float]]
 """(vx, vy, yaw rate) as they would be without friction -> with it."""
 
@@ -108,24 +108,41 @@ def windy(controls: Controls) -> bool:
     return any_of(controls.wind_x) or any_of(controls.wind_y)
 
 
-def load_function(controls: Controls, craft: Craft, ns: Namespace = math) -> LoadFunction:
+def load_function(
+    controls: Controls, craft: Craft, per_mass: float = 1.0, per_inertia: float = 1.0, ns: Namespace = math
+) -> LoadFunction:
     """The loads on the craft, but for the friction of its skirt, as a function of its motion alone.
 
-    For controls that hold. All that does not change from sub-step to sub-step is worked out here, once; a function that
-    closes over the constants costs half of one that unpacks them each time. What the scene does not ask for costs
-    nothing: the default's drag, and none at all, have functions of their own, with the bits of the general one.
+    Forces are times `per_mass`, moments times `per_inertia`: 1/m and 1/I for the accelerations; h/m and h/I for what
+    they add to the velocities in the time h.
+
+    For controls that hold. All that does not change from sub-step to sub-step is worked out here, once, so that no
+    division stands in a loop; a function that closes over the constants costs half of one that unpacks them each time.
+    What the scene does not ask for costs nothing: the default's drag, and none at all, have functions of their own,
+    with the bits of the general one.
     """
     if ns is math and craft.drag_factor == 0.0:
-        return _without_drag(controls, craft)
+        return _without_drag(controls, craft, per_mass, per_inertia)
     if craft.plain_drag and not windy(controls):
-        return _with_plain_drag(controls, craft, ns)
-    return _with_any_drag(controls, craft, ns)
+        return _with_plain_drag(controls, craft, per_mass, per_inertia, ns)
+    return _with_any_drag(controls, craft, per_mass, per_inertia, ns)
 
 
-def _with_plain_drag(controls: Controls, craft: Craft, ns: Namespace) -> LoadFunction:
+def _pushes(
+    controls: Controls, craft: Craft, per_mass: float, per_inertia: float, ns: Namespace
+) -> tuple[float, float, float]:
+    """`actuation` times the factors."""
+    thrust, side, turn = actuation(controls, craft, ns)
+    return thrust * per_mass, side * per_mass, turn * per_inertia
+
+
+def _with_plain_drag(
+    controls: Controls, craft: Craft, per_mass: float, per_inertia: float, ns: Namespace
+) -> LoadFunction:
     cos, sin, sqrt = ns.cos, ns.sin, ns.sqrt
     k, x_d = craft.drag_factor, craft.drag_center
-    thrust, side, turn = actuation(controls, craft, ns)
+    drag, turning_drag = k * per_mass, k * x_d * per_inertia
+    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia, ns)
 
     def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float, float]:
         c = cos(heading)
@@ -134,19 +151,27 @@ def _with_plain_drag(controls: Controls, craft: Craft, ns: Namespace) -> LoadFun
         # is the drag's direction and square law at once: no division, and exactly zero at rest.
         u = c * vx + s * vy
         w = c * vy - s * vx + yaw_rate * x_d
-        kq = k * sqrt(u * u + w * w)
-        drag_y = -kq * w
-        force_x = thrust - kq * u
-        force_y = drag_y + side
-        return c * force_x - s * force_y, s * force_x + c * force_y, x_d * drag_y + turn, kq
+        q = sqrt(u * u + w * w)
+        ahead = thrust - drag * u * q
+        abeam = side - drag * w * q
+        return c * ahead - s * abeam, s * ahead + c * abeam, turn - turning_drag * w * q, k * q
 
     return loads_at
 
 
-def _without_drag(controls: Controls, craft: Craft) -> LoadFunction:
+def air_speed(heading: float, vx: float, vy: float, yaw_rate: float, x_d: float) -> float:
+    """m/s: of the centre of drag, in air at rest."""
+    c = math.cos(heading)
+    s = math.sin(heading)
+    u = c * vx + s * vy
+    w = c * vy - s * vx + yaw_rate * x_d
+    return math.sqrt(u * u + w * w)
+
+
+def _without_drag(controls: Controls, craft: Craft, per_mass: float, per_inertia: float) -> LoadFunction:
     """One craft only."""
     cos, sin = math.cos, math.sin
-    thrust, side, turn = actuation(controls, craft)
+    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia, math)
 
     def loads_at(heading: float, _vx: float, _vy: float, _yaw_rate: float) -> tuple[float, float, float, float]:
         c = cos(heading)
@@ -156,17 +181,23 @@ def _without_drag(controls: Controls, craft: Craft) -> LoadFunction:
     return loads_at
 
 
-def _with_any_drag(controls: Controls, craft: Craft, ns: Namespace) -> LoadFunction:
+def _with_any_drag(
+    controls: Controls, craft: Craft, per_mass: float, per_inertia: float, ns: Namespace
+) -> LoadFunction:
     """Drag in wind, of constant or directional area, and with a moment of its own.
 
     Air that comes from the direction (u, w)/q sees the box with the area H*(W*|u| + L*|w|)/q: its walls stand square,
-    and each shows the cosine of its angle to the air. Times q, that is the drag per air speed, without a square root.
+    and each shows the cosine of its angle to the air. Times q, that is the drag per air speed, without a square root:
+    it takes the place of q, and k is 1.
     """
     cos, sin, sqrt = ns.cos, ns.sin, ns.sqrt
-    k, ahead, abeam = craft.drag_factor, craft.drag_factor_ahead, craft.drag_factor_abeam
-    x_d, spin, directional = craft.drag_center, craft.spin_drag_factor, craft.drag_area == DIRECTIONAL
-    thrust, side, turn = actuation(controls, craft, ns)
+    directional = craft.drag_area == DIRECTIONAL
+    factor_ahead, factor_abeam = craft.drag_factor_ahead, craft.drag_factor_abeam
+    x_d, spin = craft.drag_center, craft.spin_drag_factor * per_inertia
     single, wind_x, wind_y = ns is math, controls.wind_x, controls.wind_y
+    k = (1.0 if directional else craft.drag_factor) if single else ns.where(directional, 1.0, craft.drag_factor)
+    drag, turning_drag = k * per_mass, k * x_d * per_inertia
+    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia, ns)
 
     def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float, float]:
         c = cos(heading)
@@ -176,16 +207,15 @@ def _with_any_drag(controls: Controls, craft: Craft, ns: Namespace) -> LoadFunct
         u = c * air_x + s * air_y
         w = c * air_y - s * air_x + yaw_rate * x_d
         if not single:
-            kq = ns.where(directional, ahead * abs(u) + abeam * abs(w), k * sqrt(u * u + w * w))
+            q = ns.where(directional, factor_ahead * abs(u) + factor_abeam * abs(w), sqrt(u * u + w * w))
         elif directional:
-            kq = ahead * abs(u) + abeam * abs(w)
+            q = factor_ahead * abs(u) + factor_abeam * abs(w)
         else:
-            kq = k * sqrt(u * u + w * w)
-        drag_y = -kq * w
-        force_x = thrust - kq * u
-        force_y = drag_y + side
-        moment = x_d * drag_y + turn - spin * yaw_rate * abs(yaw_rate)
-        return c * force_x - s * force_y, s * force_x + c * force_y, moment, kq
+            q = sqrt(u * u + w * w)
+        ahead = thrust - drag * u * q
+        abeam = side - drag * w * q
+        moment = turn - turning_drag * w * q - spin * yaw_rate * abs(yaw_rate)
+        return c * ahead - s * abeam, s * ahead + c * abeam, moment, k * q
 
     return loads_at
 
@@ -223,17 +253,25 @@ LEAST_SLIP = 1e-150
 """m/s: so that at rest nothing is divided by zero."""
 
 
-def sliding_load_function(controls: Controls, craft: Craft, ns: Namespace = math) -> LoadFunction:
+def sliding_load_function(
+    controls: Controls, craft: Craft, per_mass: float = 1.0, per_inertia: float = 1.0, ns: Namespace = math
+) -> LoadFunction:
     """All loads on a craft that slides: those of `load_function`, and friction."""
-    free = load_function(controls, craft, ns)
-    force, radius = craft.friction_force, friction_radius(craft, ns)
+    free = load_function(controls, craft, per_mass, per_inertia, ns)
+    radius = friction_radius(craft, ns)
+    grip, turning_grip = craft.friction_force * per_mass, craft.friction_force * radius * per_inertia
     larger = max if ns is math else ns.fmax
 
     def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float, float]:
-        force_x, force_y, moment, kq = free(heading, vx, vy, yaw_rate)
+        x, y, moment, kq = free(heading, vx, vy, yaw_rate)
         turning = radius * yaw_rate
-        grip = force / larger(slip_speed(vx, vy, turning, ns), LEAST_SLIP)
-        return force_x - grip * vx, force_y - grip * vy, moment - grip * radius * turning, kq
+        slowness = 1.0 / larger(slip_speed(vx, vy, turning, ns), LEAST_SLIP)
+        return (
+            x - grip * slowness * vx,
+            y - grip * slowness * vy,
+            moment - turning_grip * slowness * turning,
+            kq,
+        )
 
     return loads_at
 
@@ -292,8 +330,8 @@ def friction_function(craft: Craft, h: float, ns: Namespace = math) -> Friction:
 def loads(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> Loads:
     """Force [N, world frame] and moment [N.m] on the craft: thrust, bow thrusters, air drag and friction."""
     if not craft.rubs:
-        return Loads(*load_function(controls, craft, ns)(*state[2:])[:3])
-    sliding = Loads(*sliding_load_function(controls, craft, ns)(*state[2:])[:3])
+        return Loads(*load_function(controls, craft, ns=ns)(*state[2:])[:3])
+    sliding = Loads(*sliding_load_function(controls, craft, ns=ns)(*state[2:])[:3])
     at_rest = (state.vx == 0.0) & (state.vy == 0.0) & (state.yaw_rate == 0.0)
     if ns is math:
         return _loads_at_rest(state, controls, craft, ns) if at_rest else sliding
@@ -303,7 +341,7 @@ def loads(state: State, controls: Controls, craft: Craft, ns: Namespace = math) 
 
 def _loads_at_rest(state: State, controls: Controls, craft: Craft, ns: Namespace) -> Loads:
     """What friction leaves of a push on a craft at rest: its implicit step from rest, over any time, gives the rate."""
-    force_x, force_y, moment, _ = load_function(controls, craft, ns)(*state[2:])
+    force_x, force_y, moment, _ = load_function(controls, craft, ns=ns)(*state[2:])
     rate = friction_function(craft, 1.0, ns)
     ax, ay, turning = rate(force_x / craft.mass, force_y / craft.mass, moment / craft.inertia)
     return Loads(craft.mass * ax, craft.mass * ay, craft.inertia * turning)
@@ -311,7 +349,7 @@ def _loads_at_rest(state: State, controls: Controls, craft: Craft, ns: Namespace
 
 def drag_per_speed(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> float:
     """k*q [kg/s]: the drag per air speed of the centre of drag."""
-    return load_function(controls, craft, ns)(*state[2:])[3]
+    return load_function(controls, craft, ns=ns)(*state[2:])[3]
 
 
 def derivatives(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> Derivatives:

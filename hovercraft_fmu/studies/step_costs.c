@@ -1,9 +1,9 @@
 /* What an FMU costs a host in C: a line "name value" for each measure, medians of interleaved samples.
 
    native_costs LIBRARY GUID RESOURCES [substeps]
-   With `substeps` also ns an evaluation in model exchange, and ns a sub-step of each method, beside the same arithmetic
-   with this platform's libm at -O3: a plain loop of semi-implicit Euler and one of Dormand-Prince, which must end in the
-   bits of the kernel, and kernel.c (compiled into this program with HOVERCRAFT_LIBM). */
+   With `substeps` also ns an evaluation in model exchange, and ns a sub-step of each method, beside others with this
+   platform's libm at -O3: a plain loop of semi-implicit Euler and one of Dormand-Prince, as people write them, which
+   must end where the kernel does but for roundings, and kernel.c (compiled into this program with HOVERCRAFT_LIBM). */
 
 #include <dlfcn.h>
 #include <math.h>
@@ -183,7 +183,7 @@ static double time_of_evaluations(const struct host *host)
     return spent / SUBSTEPS * 1e9;
 }
 
-/* What it is measured against, from rest: the kernel with libm, and plain loops that must come to the same bits. */
+/* What it is measured against, from rest: the kernel with libm, and plain loops that must end there, too. */
 static double time_of_kernel_with_libm(int method, struct stretch *stretch)
 {
     const struct craft craft = {100.0, 500.0, 20.0, 10.0, 5.0, 1.25, 1.225, -0.25, 3.0, 0.0, 10.0, CONSTANT, 0.0, 9.80665, 0.0};
@@ -290,9 +290,17 @@ static double time_of_plain_dormand_prince(struct stretch *end)
     return (now() - begun) / (double)taken * 1e9;
 }
 
-static void demand_same(const struct stretch *plain, const struct stretch *kernel)
+static bool is_close(double a, double b)
 {
-    demand(plain->substeps == kernel->substeps && memcmp(&plain->state, &kernel->state, sizeof plain->state) == 0,
+    return fabs(a - b) <= 1e-11 * larger(1.0, fabs(b));
+}
+
+static void demand_close(const struct stretch *plain, const struct stretch *kernel)
+{
+    const struct state *a = &plain->state, *b = &kernel->state;
+    demand(plain->substeps == kernel->substeps && is_close(a->x, b->x) && is_close(a->y, b->y) &&
+               is_close(a->heading, b->heading) && is_close(a->vx, b->vx) && is_close(a->vy, b->vy) &&
+               is_close(a->yaw_rate, b->yaw_rate),
            "a plain loop that ends where the kernel does");
 }
 
@@ -332,10 +340,10 @@ static void measure(struct host *host, bool with_substeps)
             cases[n++].samples[k] = time_of_evaluations(host);
             strcpy(cases[n].name, "plain_semi_implicit_euler");
             cases[n++].samples[k] = time_of_plain_euler(&plain);
-            demand_same(&plain, &with_libm[SEMI_IMPLICIT_EULER]);
+            demand_close(&plain, &with_libm[SEMI_IMPLICIT_EULER]);
             strcpy(cases[n].name, "plain_adaptive");
             cases[n++].samples[k] = time_of_plain_dormand_prince(&plain);
-            demand_same(&plain, &with_libm[ADAPTIVE]);
+            demand_close(&plain, &with_libm[ADAPTIVE]);
         }
     }
     for (int i = 0; i < n; i++)

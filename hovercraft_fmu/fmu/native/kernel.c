@@ -180,14 +180,20 @@ static bool is_windy(const struct drive *drive)
 
 enum drag_kind { WITHOUT_DRAG, PLAIN_DRAG, ANY_DRAG };
 
-/* All that the loads need and that does not change from sub-step to sub-step; `steer` renews the controls' part. */
+/* All that the loads need and that does not change from sub-step to sub-step; `steer` renews the controls' part. Forces
+   are times `per_mass`, moments times `per_inertia`: so no division, and no constant factor, stands in a loop. */
 struct load_function {
     enum drag_kind kind;
     bool slides; /* friction is one of the loads */
     bool directional;
-    double k, ahead, abeam, spin, x_d;
-    double force, radius;      /* N, m: of friction */
-    double thrust, side, turn; /* N, N, N.m */
+    double per_mass, per_inertia;
+    double k;                  /* kg/m; with the directional area 1, as q then has the two factors in it */
+    double ahead, abeam, x_d;  /* kg/m, kg/m, m */
+    double drag, turning_drag; /* k, and k*x_d */
+    double spin;               /* of the rotational drag */
+    double grip, turning_grip; /* of friction: its force, and force*radius */
+    double radius;             /* m: of friction */
+    double thrust, side, turn;
     double wind_x, wind_y;     /* m/s */
     double begun;              /* s: where in the communication step its time 0 is */
     const struct craft *craft;
@@ -198,9 +204,9 @@ struct load_function {
 static void steer(struct load_function *f, const struct controls *controls)
 {
     const struct controls held = kernel_saturate(controls, f->craft);
-    f->thrust = held.thrust;
-    f->side = f->craft->steering_force * (held.port - held.starboard);
-    f->turn = thruster_moment(f->craft) * (held.port - held.starboard);
+    f->thrust = held.thrust * f->per_mass;
+    f->side = f->craft->steering_force * (held.port - held.starboard) * f->per_mass;
+    f->turn = thruster_moment(f->craft) * (held.port - held.starboard) * f->per_inertia;
     f->wind_x = held.wind_x;
     f->wind_y = held.wind_y;
 }
@@ -223,35 +229,45 @@ struct friction_radius kernel_friction_radius(const struct craft *craft)
     return (struct friction_radius){d / 6.0 + (along + across) / 12.0, d, along, across};
 }
 
-/* The loads on the craft, but for the friction of its skirt. */
-static struct load_function load_function(const struct drive *drive, const struct craft *craft)
+/* The loads on the craft, but for the friction of its skirt: 1 and 1 for forces and moment; 1/m and 1/I for the
+   accelerations; h/m and h/I for what they add to the velocities in the time h. */
+static struct load_function load_function(const struct drive *drive, const struct craft *craft, double per_mass,
+                                          double per_inertia)
 {
-    struct load_function f = {.k = drag_factor(craft), .x_d = drag_center(craft), .craft = craft, .drive = drive};
+    struct load_function f = {.per_mass = per_mass, .per_inertia = per_inertia, .craft = craft, .drive = drive};
+    f.k = drag_factor(craft);
+    f.x_d = drag_center(craft);
     f.kind = f.k == 0.0 ? WITHOUT_DRAG : has_plain_drag(craft) && !is_windy(drive) ? PLAIN_DRAG : ANY_DRAG;
     if (f.kind == ANY_DRAG) {
-        f.directional = craft->drag_area == DIRECTIONAL;
         f.ahead = drag_factor_ahead(craft);
         f.abeam = drag_factor_abeam(craft);
-        f.spin = spin_drag_factor(craft);
+        f.spin = spin_drag_factor(craft) * per_inertia;
+        f.directional = craft->drag_area == DIRECTIONAL;
+        if (f.directional)
+            f.k = 1.0;
     }
+    f.drag = f.k * per_mass;
+    f.turning_drag = f.k * f.x_d * per_inertia;
     steer(&f, &drive->start);
     return f;
 }
 
 /* All loads on a craft that slides. */
-static struct load_function sliding_load_function(const struct drive *drive, const struct craft *craft)
+static struct load_function sliding_load_function(const struct drive *drive, const struct craft *craft,
+                                                  double per_mass, double per_inertia)
 {
-    struct load_function f = load_function(drive, craft);
+    struct load_function f = load_function(drive, craft, per_mass, per_inertia);
     f.slides = true;
-    f.force = friction_force(craft);
     f.radius = kernel_friction_radius(craft).radius;
+    f.grip = friction_force(craft) * per_mass;
+    f.turning_grip = friction_force(craft) * f.radius * per_inertia;
     return f;
 }
 
-/* Velocity of the centre of drag through the air, body frame, and k*q. */
+/* Velocity of the centre of drag through the air, body frame, and its size; see `k` above. */
 struct air {
     double u, w; /* m/s */
-    double kq;   /* kg/s */
+    double q;    /* m/s */
 };
 
 static ALWAYS_INLINE struct air air_at(const struct load_function *f, enum drag_kind kind, double c, double s,
@@ -266,8 +282,8 @@ static ALWAYS_INLINE struct air air_at(const struct load_function *f, enum drag_
     }
     air.u = c * vx + s * vy;
     air.w = c * vy - s * vx + yaw_rate * f->x_d;
-    air.kq = kind == ANY_DRAG && f->directional ? f->ahead * fabs(air.u) + f->abeam * fabs(air.w)
-                            : f->k * sqrt(air.u * air.u + air.w * air.w);
+    air.q = kind == ANY_DRAG && f->directional ? f->ahead * fabs(air.u) + f->abeam * fabs(air.w)
+                                               : sqrt(air.u * air.u + air.w * air.w);
     return air;
 }
 
@@ -287,20 +303,19 @@ static ALWAYS_INLINE struct loads loads_as(struct load_function *f, enum drag_ki
         loads = (struct loads){c * f->thrust - s * f->side, s * f->thrust + c * f->side, f->turn, 0.0};
     } else {
         const struct air air = air_at(f, kind, c, s, vx, vy, yaw_rate);
-        const double drag_y = -air.kq * air.w;
-        const double force_x = f->thrust - air.kq * air.u;
-        const double force_y = drag_y + f->side;
-        double moment = f->x_d * drag_y + f->turn;
+        const double force_x = f->thrust - f->drag * air.u * air.q;
+        const double force_y = f->side - f->drag * air.w * air.q;
+        double moment = f->turn - f->turning_drag * air.w * air.q;
         if (kind == ANY_DRAG)
             moment = moment - f->spin * yaw_rate * fabs(yaw_rate);
-        loads = (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, moment, air.kq};
+        loads = (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, moment, f->k * air.q};
     }
     if (slides) {
         const double turning = f->radius * yaw_rate;
-        const double grip = f->force / larger(slip_speed(vx, vy, turning), LEAST_SLIP);
-        loads.x = loads.x - grip * vx;
-        loads.y = loads.y - grip * vy;
-        loads.moment = loads.moment - grip * f->radius * turning;
+        const double slowness = 1.0 / larger(slip_speed(vx, vy, turning), LEAST_SLIP);
+        loads.x = loads.x - f->grip * slowness * vx;
+        loads.y = loads.y - f->grip * slowness * vy;
+        loads.moment = loads.moment - f->turning_grip * slowness * turning;
     }
     return loads;
 }
@@ -369,7 +384,8 @@ static struct loads loads_at_rest(struct load_function *f, double heading)
 struct loads kernel_loads_on(const struct state *state, const struct controls *controls, const struct craft *craft)
 {
     const struct drive drive = {.start = *controls};
-    struct load_function f = rubs(craft) ? sliding_load_function(&drive, craft) : load_function(&drive, craft);
+    struct load_function f =
+        rubs(craft) ? sliding_load_function(&drive, craft, 1.0, 1.0) : load_function(&drive, craft, 1.0, 1.0);
     if (rubs(craft) && state->vx == 0.0 && state->vy == 0.0 && state->yaw_rate == 0.0) {
         f.slides = false;
         return loads_at_rest(&f, state->heading);
@@ -421,28 +437,28 @@ static struct stretch stretch_of(struct load_function *f, const struct state *s,
 static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, const struct state *state, struct load_function *f,
                                              double h, int64_t n)
 {
-    const double mass = f->craft->mass, inertia = f->craft->inertia;
     const struct friction friction = friction_function(f->craft, h);
     struct state s = *state;
     struct watch watch = {0.0, s.yaw_rate, s.yaw_rate};
     for (int64_t i = 0; i < n; i++) {
         steer_at(f, (double)i * h);
-        const struct loads loads = loads_as(f, kind, false, s.heading, s.vx, s.vy, s.yaw_rate);
-        s.vx = s.vx + h * (loads.x / mass);
-        s.vy = s.vy + h * (loads.y / mass);
-        s.yaw_rate = s.yaw_rate + h * (loads.moment / inertia);
+        const struct loads push = loads_as(f, kind, false, s.heading, s.vx, s.vy, s.yaw_rate);
+        s.vx = s.vx + push.x;
+        s.vy = s.vy + push.y;
+        s.yaw_rate = s.yaw_rate + push.moment;
         if (friction.rubs)
             rub(&friction, &s.vx, &s.vy, &s.yaw_rate);
         s.x = s.x + h * s.vx;
         s.y = s.y + h * s.vy;
         s.heading = s.heading + h * s.yaw_rate;
-        watch_loads(&watch, loads.kq);
+        watch_loads(&watch, push.kq);
         watch_yaw_rate(&watch, s.yaw_rate);
     }
     return stretch_of(f, &s, n, h, &watch);
 }
 
-/* The compiler makes a loop of its own for the default's drag: what a scene does not ask for costs nothing. */
+/* Of loads in the time h. The compiler makes a loop of its own for the default's drag: what a scene does not ask for
+   costs nothing. */
 static struct stretch semi_implicit_euler(const struct state *state, struct load_function *f, double h, int64_t n)
 {
     return f->kind == PLAIN_DRAG ? euler_as(PLAIN_DRAG, state, f, h, n) : euler_as(f->kind, state, f, h, n);
@@ -461,7 +477,7 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
         steer_at(f, (double)i * h);
         const struct trig_pair turned = sine_cosine(z.heading, &f->last);
         const double c = turned.cosine, s = turned.sine;
-        const double kq = air_at(f, f->kind, c, s, z.vx, z.vy, z.yaw_rate).kq;
+        const double kq = f->k * air_at(f, f->kind, c, s, z.vx, z.vy, z.yaw_rate).q;
         const double g = h * kq;
         if (in_wind) {
             z.vx = z.vx - f->wind_x;
@@ -495,15 +511,7 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
     return stretch_of(f, &z, n, h, &watch);
 }
 
-/* The accelerations in place of the loads. */
-static ALWAYS_INLINE struct loads accelerations_as(struct load_function *f, enum drag_kind kind, bool slides,
-                                                   double heading, double vx, double vy, double yaw_rate)
-{
-    const struct loads loads = loads_as(f, kind, slides, heading, vx, vy, yaw_rate);
-    return (struct loads){loads.x / f->craft->mass, loads.y / f->craft->mass, loads.moment / f->craft->inertia,
-                          loads.kq};
-}
-
+/* Of accelerations. */
 static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, bool slides, const struct state *state,
                                            struct load_function *f, double h, int64_t n)
 {
@@ -513,17 +521,17 @@ static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, bool slides, con
     for (int64_t i = 0; i < n; i++) {
         const double t = (double)i * h;
         steer_at(f, t);
-        const struct loads a1 = accelerations_as(f, kind, slides, s.heading, s.vx, s.vy, s.yaw_rate);
+        const struct loads a1 = loads_as(f, kind, slides, s.heading, s.vx, s.vy, s.yaw_rate);
         const double r2 = s.yaw_rate + half * a1.moment;
         steer_at(f, t + half);
-        const struct loads a2 = accelerations_as(f, kind, slides, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
+        const struct loads a2 = loads_as(f, kind, slides, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
                                                  s.vy + half * a1.y, r2);
         const double r3 = s.yaw_rate + half * a2.moment;
         const struct loads a3 =
-            accelerations_as(f, kind, slides, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
+            loads_as(f, kind, slides, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
         const double r4 = s.yaw_rate + h * a3.moment;
         steer_at(f, t + h);
-        const struct loads a4 = accelerations_as(f, kind, slides, s.heading + h * r3, s.vx + h * a3.x,
+        const struct loads a4 = loads_as(f, kind, slides, s.heading + h * r3, s.vx + h * a3.x,
                                                  s.vy + h * a3.y, r4);
         s.x = s.x + h * s.vx + square * (a1.x + a2.x + a3.x);
         s.y = s.y + h * s.vy + square * (a1.y + a2.y + a3.y);
@@ -550,17 +558,19 @@ static struct stretch smooth_rk4(const struct state *state, struct load_function
 }
 
 /* While it slides, friction is a load like others. Near rest it is not: an implicit step of Euler's. */
-static struct stretch rk4_with_friction(const struct state *state, struct load_function *f, double h, int64_t n)
+static struct stretch rk4_with_friction(const struct state *state, const struct drive *drive,
+                                        const struct craft *craft, double h, int64_t n)
 {
-    struct load_function sliding = sliding_load_function(f->drive, f->craft);
-    const struct friction friction = friction_function(f->craft, h);
+    struct load_function free = load_function(drive, craft, h / craft->mass, h / craft->inertia);
+    struct load_function sliding = sliding_load_function(drive, craft, 1.0 / craft->mass, 1.0 / craft->inertia);
+    const struct friction friction = friction_function(craft, h);
     const double near = NEAR_REST * larger(friction.a, friction.b);
     struct stretch whole = {.state = *state, .substeps = n, .substep = h};
     for (int64_t i = 0; i < n; i++) {
         const struct state *s = &whole.state;
         const bool at_rest = slip_speed(s->vx, s->vy, friction.radius * s->yaw_rate) < near;
-        f->begun = sliding.begun = (double)i * h;
-        const struct stretch one = at_rest ? semi_implicit_euler(s, f, h, 1) : smooth_rk4(s, &sliding, h, 1);
+        free.begun = sliding.begun = (double)i * h;
+        const struct stretch one = at_rest ? semi_implicit_euler(s, &free, h, 1) : smooth_rk4(s, &sliding, h, 1);
         whole.state = one.state;
         whole.drag_mass = larger(whole.drag_mass, one.drag_mass);
         whole.rotation = larger(whole.rotation, one.rotation);
@@ -568,9 +578,13 @@ static struct stretch rk4_with_friction(const struct state *state, struct load_f
     return whole;
 }
 
-static struct stretch rk4(const struct state *state, struct load_function *f, double h, int64_t n)
+static struct stretch rk4(const struct state *state, const struct drive *drive, const struct craft *craft, double h,
+                          int64_t n)
 {
-    return rubs(f->craft) ? rk4_with_friction(state, f, h, n) : smooth_rk4(state, f, h, n);
+    if (rubs(craft))
+        return rk4_with_friction(state, drive, craft, h, n);
+    struct load_function f = load_function(drive, craft, 1.0 / craft->mass, 1.0 / craft->inertia);
+    return smooth_rk4(state, &f, h, n);
 }
 
 enum { STAGES = 7 };
@@ -616,7 +630,7 @@ struct rates {
 
 static struct rates rates_at(struct load_function *f, const double y[COMPONENTS])
 {
-    const struct loads a = accelerations_as(f, f->kind, f->slides, y[HEADING], y[VX], y[VY], y[YAW_RATE]);
+    const struct loads a = loads_at(f, y[HEADING], y[VX], y[VY], y[YAW_RATE]);
     return (struct rates){
         .of = {[X] = y[VX], [Y] = y[VY], [HEADING] = y[YAW_RATE], [VX] = a.x, [VY] = a.y, [YAW_RATE] = a.moment},
         .kq = a.kq,
@@ -667,12 +681,13 @@ static bool can_slide(const struct load_function *f, const double y[COMPONENTS],
 }
 
 /* An implicit step of Euler's; its error is at most all that it changes of the velocity, and h times that. */
-static double near_rest(struct load_function *free, struct load_function *f, double time, const double y[COMPONENTS],
-                        double h, struct rates *rates, double new[COMPONENTS])
+static double near_rest(struct load_function *f, double time, const double y[COMPONENTS], double h,
+                        struct rates *rates, double new[COMPONENTS])
 {
     const struct state before = state_of(y);
-    free->begun = time;
-    const struct state after = semi_implicit_euler(&before, free, h, 1).state;
+    struct load_function free = load_function(f->drive, f->craft, h / f->craft->mass, h / f->craft->inertia);
+    free.begun = time;
+    const struct state after = semi_implicit_euler(&before, &free, h, 1).state;
     const double change = larger(larger(fabs(after.vx - y[VX]), fabs(after.vy - y[VY])),
                                  fabs(after.yaw_rate - y[YAW_RATE]));
     components_of(&after, new);
@@ -685,8 +700,9 @@ static double near_rest(struct load_function *free, struct load_function *f, dou
 static enum outcome adaptive(const struct state *state, const struct drive *drive, const struct craft *craft,
                              double duration, double tolerance, double proposed, struct stretch *stretch)
 {
-    struct load_function free = load_function(drive, craft);
-    struct load_function f = rubs(craft) ? sliding_load_function(drive, craft) : free;
+    const double per_mass = 1.0 / craft->mass, per_inertia = 1.0 / craft->inertia;
+    struct load_function f = rubs(craft) ? sliding_load_function(drive, craft, per_mass, per_inertia)
+                                         : load_function(drive, craft, per_mass, per_inertia);
     const struct friction friction = friction_function(craft, 1.0);
     double y[COMPONENTS];
     double time = 0.0, most = 0.0, fastest = 0.0;
@@ -701,7 +717,7 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
             h = smaller(h, longest);
         const bool last = h >= duration - time;
         const double error = slides ? dormand_prince(&f, time, y, h, stages, new)
-                                    : near_rest(&free, &f, time, y, h, &stages[STAGES - 1], new);
+                                    : near_rest(&f, time, y, h, &stages[STAGES - 1], new);
         if (!(error <= tolerance)) {
             proposed = error < INFINITY ? h * larger(0.2, 0.9 * sqrt(sqrt(tolerance / error))) : 0.2 * h;
             if (proposed < MIN_STEP) {
@@ -762,7 +778,6 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
                      double communication_step, const struct settings *settings, double proposed,
                      struct stretch *stretch)
 {
-    struct load_function f = load_function(drive, craft);
     int64_t n;
     double h;
     if (settings->integrator == ADAPTIVE)
@@ -770,9 +785,15 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
                         proposed != 0.0 ? proposed : settings->step_size, stretch);
     if (!substeps(communication_step, settings->step_size, &n, &h))
         return TOO_MANY_SUBSTEPS;
-    *stretch = settings->integrator == RK4             ? rk4(state, &f, h, n)
-               : settings->integrator == DRAG_IMPLICIT ? drag_implicit(state, &f, h, n)
-                                                       : semi_implicit_euler(state, &f, h, n);
+    if (settings->integrator == RK4) {
+        *stretch = rk4(state, drive, craft, h, n);
+    } else if (settings->integrator == DRAG_IMPLICIT) {
+        struct load_function f = load_function(drive, craft, 1.0, 1.0);
+        *stretch = drag_implicit(state, &f, h, n);
+    } else {
+        struct load_function f = load_function(drive, craft, h / craft->mass, h / craft->inertia);
+        *stretch = semi_implicit_euler(state, &f, h, n);
+    }
     if (isinf(stretch->state.heading)) /* its sine is no number; in Python it raises, and nothing is left */
         stretch->state = (struct state){NAN, NAN, NAN, NAN, NAN, NAN};
     return is_finite(&stretch->state) ? ADVANCED : NOT_FINITE;
