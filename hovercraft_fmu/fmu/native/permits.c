@@ -11,61 +11,72 @@ struct permit {
     const char *names[2]; /* in FMI 2.0, in FMI 3.0 */
     unsigned phases;      /* bit n: in phase n */
     unsigned named;       /* those that a refusal names; 0: all */
-    bool one_use;         /* only an instance for this use has the call */
-    enum use use;
+    enum { FOR_BOTH, FOR_STEPS, FOR_EXCHANGE } only; /* instances for this use have the call */
 };
 
 static const struct permit PERMITS[CALL_COUNT] = {
-    [SET_DEBUG_LOGGING] = {{"fmi2SetDebugLogging", "fmi3SetDebugLogging"}, EVER},
-    [SET_UP] = {{"fmi2SetupExperiment", "fmi3EnterInitializationMode"}, IN(INSTANTIATED)},
-    [ENTER_INITIALIZATION] = {{"fmi2EnterInitializationMode", "fmi3EnterInitializationMode"}, IN(INSTANTIATED)},
-    [EXIT_INITIALIZATION] = {{"fmi2ExitInitializationMode", "fmi3ExitInitializationMode"}, IN(INITIALIZING)},
-    [TERMINATE] = {{"fmi2Terminate", "fmi3Terminate"}, IN(STEPPING) | SOLVED},
-    [RESET] = {{"fmi2Reset", "fmi3Reset"}, EVER},
+    [SET_DEBUG_LOGGING] = {.names = {"fmi2SetDebugLogging", "fmi3SetDebugLogging"}, .phases = EVER},
+    [SET_UP] = {.names = {"fmi2SetupExperiment", "fmi3EnterInitializationMode"}, .phases = IN(INSTANTIATED)},
+    [ENTER_INITIALIZATION] = {.names = {"fmi2EnterInitializationMode", "fmi3EnterInitializationMode"},
+                              .phases = IN(INSTANTIATED)},
+    [EXIT_INITIALIZATION] = {.names = {"fmi2ExitInitializationMode", "fmi3ExitInitializationMode"},
+                             .phases = IN(INITIALIZING)},
+    [TERMINATE] = {.names = {"fmi2Terminate", "fmi3Terminate"}, .phases = IN(STEPPING) | SOLVED},
+    [RESET] = {.names = {"fmi2Reset", "fmi3Reset"}, .phases = EVER},
 
-    [GET_REALS] = {{"fmi2GetReal", "fmi3GetFloat64"}, EVER},
-    [SET_REALS] = {{"fmi2SetReal", "fmi3SetFloat64"}, EVER}, /* each variable has phases of its own */
-    [GET_INTEGERS] = {{"fmi2GetInteger", "fmi3GetInt32"}, EVER},
-    [SET_INTEGERS] = {{"fmi2SetInteger", "fmi3SetInt32"}, EVER},
-    [GET_ENUMERATIONS] = {{"fmi2GetInteger", "fmi3GetInt64"}, EVER},
-    [SET_ENUMERATIONS] = {{"fmi2SetInteger", "fmi3SetInt64"}, EVER},
+    [GET_REALS] = {.names = {"fmi2GetReal", "fmi3GetFloat64"}, .phases = EVER},
+    [SET_REALS] = {.names = {"fmi2SetReal", "fmi3SetFloat64"},
+                   .phases = EVER}, /* each variable has phases of its own */
+    [GET_INTEGERS] = {.names = {"fmi2GetInteger", "fmi3GetInt32"}, .phases = EVER},
+    [SET_INTEGERS] = {.names = {"fmi2SetInteger", "fmi3SetInt32"}, .phases = EVER},
+    [GET_ENUMERATIONS] = {.names = {"fmi2GetInteger", "fmi3GetInt64"}, .phases = EVER},
+    [SET_ENUMERATIONS] = {.names = {"fmi2SetInteger", "fmi3SetInt64"}, .phases = EVER},
 
-    [GET_FMU_STATE] = {{"fmi2GetFMUstate", "fmi3GetFMUState"}, EVER},
-    [SET_FMU_STATE] = {{"fmi2SetFMUstate", "fmi3SetFMUState"}, EVER},
-    [FREE_FMU_STATE] = {{"fmi2FreeFMUstate", "fmi3FreeFMUState"}, EVER},
-    [SIZE_FMU_STATE] = {{"fmi2SerializedFMUstateSize", "fmi3SerializedFMUStateSize"}, EVER},
-    [SERIALIZE_FMU_STATE] = {{"fmi2SerializeFMUstate", "fmi3SerializeFMUState"}, EVER},
-    [DESERIALIZE_FMU_STATE] = {{"fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState"}, EVER},
+    [GET_FMU_STATE] = {.names = {"fmi2GetFMUstate", "fmi3GetFMUState"}, .phases = EVER},
+    [SET_FMU_STATE] = {.names = {"fmi2SetFMUstate", "fmi3SetFMUState"}, .phases = EVER},
+    [FREE_FMU_STATE] = {.names = {"fmi2FreeFMUstate", "fmi3FreeFMUState"}, .phases = EVER},
+    [SIZE_FMU_STATE] = {.names = {"fmi2SerializedFMUstateSize", "fmi3SerializedFMUStateSize"}, .phases = EVER},
+    [SERIALIZE_FMU_STATE] = {.names = {"fmi2SerializeFMUstate", "fmi3SerializeFMUState"}, .phases = EVER},
+    [DESERIALIZE_FMU_STATE] = {.names = {"fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState"}, .phases = EVER},
 
-    [DIRECTIONAL_DERIVATIVE] = {{"fmi2GetDirectionalDerivative", "fmi3GetDirectionalDerivative"},
-                                PAST(INSTANTIATED), IN(INITIALIZING)},
-    [ADJOINT_DERIVATIVE] = {{"", "fmi3GetAdjointDerivative"}, PAST(INSTANTIATED), IN(INITIALIZING)},
+    [DIRECTIONAL_DERIVATIVE] = {.names = {"fmi2GetDirectionalDerivative", "fmi3GetDirectionalDerivative"},
+                                .phases = PAST(INSTANTIATED), .named = IN(INITIALIZING)},
+    [ADJOINT_DERIVATIVE] = {.names = {"", "fmi3GetAdjointDerivative"},
+                            .phases = PAST(INSTANTIATED), .named = IN(INITIALIZING)},
 
-    [SET_INPUT_RATES] = {{"fmi2SetRealInputDerivatives", ""}, EVER, 0, true, CO_SIMULATION},
-    [GET_OUTPUT_RATES] = {{"fmi2GetRealOutputDerivatives", "fmi3GetOutputDerivatives"}, EVER, 0, true, CO_SIMULATION},
-    [STEP] = {{"fmi2DoStep", "fmi3DoStep"}, IN(STEPPING)},
-    [CANCEL_STEP] = {{"fmi2CancelStep", ""}, EVER},
-    [GET_STATUS] = {{"fmi2GetStatus", ""}, EVER},
-    [GET_REAL_STATUS] = {{"fmi2GetRealStatus", ""}, EVER},
-    [GET_INTEGER_STATUS] = {{"fmi2GetIntegerStatus", ""}, EVER},
-    [GET_BOOLEAN_STATUS] = {{"fmi2GetBooleanStatus", ""}, EVER},
-    [GET_STRING_STATUS] = {{"fmi2GetStringStatus", ""}, EVER},
+    [SET_INPUT_RATES] = {.names = {"fmi2SetRealInputDerivatives", ""},
+                         .phases = EVER, .only = FOR_STEPS},
+    [GET_OUTPUT_RATES] = {.names = {"fmi2GetRealOutputDerivatives", "fmi3GetOutputDerivatives"},
+                          .phases = EVER, .only = FOR_STEPS},
+    [STEP] = {.names = {"fmi2DoStep", "fmi3DoStep"}, .phases = IN(STEPPING)},
+    [CANCEL_STEP] = {.names = {"fmi2CancelStep", ""}, .phases = EVER},
+    [GET_STATUS] = {.names = {"fmi2GetStatus", ""}, .phases = EVER},
+    [GET_REAL_STATUS] = {.names = {"fmi2GetRealStatus", ""}, .phases = EVER},
+    [GET_INTEGER_STATUS] = {.names = {"fmi2GetIntegerStatus", ""}, .phases = EVER},
+    [GET_BOOLEAN_STATUS] = {.names = {"fmi2GetBooleanStatus", ""}, .phases = EVER},
+    [GET_STRING_STATUS] = {.names = {"fmi2GetStringStatus", ""}, .phases = EVER},
 
-    [ENTER_EVENT_MODE] = {{"fmi2EnterEventMode", "fmi3EnterEventMode"}, SOLVED},
-    [ENTER_CONTINUOUS_TIME] = {{"fmi2EnterContinuousTimeMode", "fmi3EnterContinuousTimeMode"}, IN(EVENT_MODE)},
-    [UPDATE_DISCRETE_STATES] = {{"fmi2NewDiscreteStates", "fmi3UpdateDiscreteStates"}, IN(EVENT_MODE)},
-    [COMPLETE_INTEGRATOR_STEP] = {{"fmi2CompletedIntegratorStep", "fmi3CompletedIntegratorStep"}, IN(CONTINUOUS_TIME)},
-    [SET_TIME] = {{"fmi2SetTime", "fmi3SetTime"}, SOLVED},
-    [SET_STATES] = {{"fmi2SetContinuousStates", "fmi3SetContinuousStates"}, IN(CONTINUOUS_TIME)},
-    [GET_STATES] = {{"fmi2GetContinuousStates", "fmi3GetContinuousStates"},
-                    PAST(INSTANTIATED), IN(INITIALIZING), true, MODEL_EXCHANGE},
-    [GET_DERIVATIVES] = {{"fmi2GetDerivatives", "fmi3GetContinuousStateDerivatives"},
-                         PAST(INSTANTIATED), IN(INITIALIZING), true, MODEL_EXCHANGE},
-    [GET_NOMINALS] = {{"fmi2GetNominalsOfContinuousStates", "fmi3GetNominalsOfContinuousStates"},
-                      EVER, 0, true, MODEL_EXCHANGE},
-    [GET_EVENT_INDICATORS] = {{"fmi2GetEventIndicators", "fmi3GetEventIndicators"}, EVER, 0, true, MODEL_EXCHANGE},
-    [COUNT_STATES] = {{"", "fmi3GetNumberOfContinuousStates"}, EVER, 0, true, MODEL_EXCHANGE},
-    [COUNT_EVENT_INDICATORS] = {{"", "fmi3GetNumberOfEventIndicators"}, EVER, 0, true, MODEL_EXCHANGE},
+    [ENTER_EVENT_MODE] = {.names = {"fmi2EnterEventMode", "fmi3EnterEventMode"}, .phases = SOLVED},
+    [ENTER_CONTINUOUS_TIME] = {.names = {"fmi2EnterContinuousTimeMode", "fmi3EnterContinuousTimeMode"},
+                               .phases = IN(EVENT_MODE)},
+    [UPDATE_DISCRETE_STATES] = {.names = {"fmi2NewDiscreteStates", "fmi3UpdateDiscreteStates"},
+                                .phases = IN(EVENT_MODE)},
+    [COMPLETE_INTEGRATOR_STEP] = {.names = {"fmi2CompletedIntegratorStep", "fmi3CompletedIntegratorStep"},
+                                  .phases = IN(CONTINUOUS_TIME)},
+    [SET_TIME] = {.names = {"fmi2SetTime", "fmi3SetTime"}, .phases = SOLVED},
+    [SET_STATES] = {.names = {"fmi2SetContinuousStates", "fmi3SetContinuousStates"}, .phases = IN(CONTINUOUS_TIME)},
+    [GET_STATES] = {.names = {"fmi2GetContinuousStates", "fmi3GetContinuousStates"},
+                    .phases = PAST(INSTANTIATED), .named = IN(INITIALIZING), .only = FOR_EXCHANGE},
+    [GET_DERIVATIVES] = {.names = {"fmi2GetDerivatives", "fmi3GetContinuousStateDerivatives"},
+                         .phases = PAST(INSTANTIATED), .named = IN(INITIALIZING), .only = FOR_EXCHANGE},
+    [GET_NOMINALS] = {.names = {"fmi2GetNominalsOfContinuousStates", "fmi3GetNominalsOfContinuousStates"},
+                      .phases = EVER, .only = FOR_EXCHANGE},
+    [GET_EVENT_INDICATORS] = {.names = {"fmi2GetEventIndicators", "fmi3GetEventIndicators"},
+                              .phases = EVER, .only = FOR_EXCHANGE},
+    [COUNT_STATES] = {.names = {"", "fmi3GetNumberOfContinuousStates"},
+                      .phases = EVER, .only = FOR_EXCHANGE},
+    [COUNT_EVENT_INDICATORS] = {.names = {"", "fmi3GetNumberOfEventIndicators"},
+                                .phases = EVER, .only = FOR_EXCHANGE},
 };
 
 const char *call_name(const struct instance *instance, enum call call)
@@ -107,9 +118,9 @@ bool permitted(struct instance *instance, enum call call, bool given)
     const struct permit *permit = &PERMITS[call];
     if (!instance || !permitted_always(instance, call_name(instance, call), given))
         return false;
-    if (permit->one_use && instance->now.use != permit->use)
+    if (permit->only && permit->only != (instance->now.use == MODEL_EXCHANGE ? FOR_EXCHANGE : FOR_STEPS))
         instance_say(instance, REFUSED, "%s: must be called of an instance for %s", call_name(instance, call),
-                     permit->use == MODEL_EXCHANGE ? "model exchange" : "co-simulation");
+                     permit->only == FOR_EXCHANGE ? "model exchange" : "co-simulation");
     else if (!(permit->phases & IN(instance->now.phase)))
         refuse_phase(instance, call_name(instance, call), named_phases(permit, instance->now.use));
     else
