@@ -42,7 +42,8 @@ from .view.tables import markdown
 
 DEMO_FOLDER = Path("build") / "demo"
 DEMO_LOG = CONTROL_LOGS / "ice.csv"
-OUTPUT = Console(soft_wrap=True, highlight=False, width=None if sys.stdout.isatty() else 160)
+OUTPUT = Console(soft_wrap=True, highlight=False, markup=False, width=None if sys.stdout.isatty() else 160)
+"""All that is printed is meant as it stands: pip install 'hovercraft-fmu[plot]' is no markup."""
 LINE_EVERY = 10.0
 """s: of progress, where it is not shown on a terminal."""
 EXPECTED = (ValueError, OSError, ArithmeticError, SimulationError, ModuleNotFoundError)
@@ -92,17 +93,18 @@ def build_command(kinds: tuple[str, ...], output: Path) -> None:
     KIND is native, native3, python, autopilot, native_loop or python_loop; without it all are written.
     """
     wanted = [product(kind) for kind in kinds] or list(PRODUCTS.values())
-    if problems := [problem for each in wanted if (problem := _written(each, output / each.name))]:
-        raise click.ClickException("; ".join(problems))
+    reasons = {each.name: _written(each, output / each.name) for each in wanted}
+    if missing := [name for name, reason in reasons.items() if reason]:
+        raise click.ClickException(f"not written: {', '.join(missing)}; {reasons[missing[0]]}")
 
 
 def _written(chosen: Product, path: Path) -> str:
-    """Write a file and say what it is for; returns why it was not written where its machine code is missing."""
+    """Write a file and say what it is for; returns why there is no machine code where that is missing."""
     try:
         chosen.write(path)
     except NotCompiledError as error:
-        return f"{chosen.name} was not written: {error}"
-    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, {chosen.purpose}", markup=False)
+        return str(error)
+    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, {chosen.purpose}")
     return ""
 
 
@@ -210,7 +212,7 @@ def drive_command(
         words = ["hovercraft-fmu", "simulate", str(path), "--input", str(log), "--preset", preset]
         words += ["--communication-step", repr(run.communication_step)]
         words += [word for name, value in start_values.items() for word in ("--set", f"{name}={value}")]
-        OUTPUT.print(f"recorded {log}; to replay it:\n  {shlex.join(words)}", markup=False)
+        OUTPUT.print(f"recorded {log}; to replay it:\n  {shlex.join(words)}")
 
     end = drive(run, path, record=record, recorded=recorded, time_scale=time_scale)
     OUTPUT.print(f"ended at ({end.x:.3f}, {end.y:.3f}) m, heading {np.degrees(end.heading):.2f} deg")
@@ -312,7 +314,7 @@ def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 
     folder = output or Path("build") / "measure" / name
     with _progress(1.0, f"measuring {name}") as tell:
         report = carry_out(name, quick, folder, tell)
-    OUTPUT.print(f"{report}\n\nwrote {folder}/", markup=False)
+    OUTPUT.print(f"{report}\n\nwrote {folder}/")
 
 
 @commands.command("sweep")
@@ -353,7 +355,7 @@ def sweep_command(
     seconds = perf_counter() - begun
     OUTPUT.print(f"{outcome.folder}: {outcome.runs} runs, {outcome.new} of them made now in {seconds:.1f} s")
     if outcome.error:
-        OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}", markup=False)
+        OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}")
     if outcome.warned:
         OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
     _print_extremes(outcome.folder)
@@ -441,7 +443,7 @@ def _validated(fmu: Path) -> int:
     for check in validate(fmu):
         OUTPUT.print(f"  {check.result:6} {check.what} ({check.checker} {check.version})")
         for problem in check.problems:
-            OUTPUT.print(f"         {problem}", markup=False)
+            OUTPUT.print(f"         {problem}")
         problems += len(check.problems)
     return problems
 
@@ -521,7 +523,7 @@ def _print_result(result: Result) -> None:
     }
     _print_rows(f"{run.title}: {run.method}", rows)
     for warning in result.warnings:
-        OUTPUT.print(f"warning: {warning}", markup=False)
+        OUTPUT.print(f"warning: {warning}")
 
 
 def _write(result: Result, output: Path | None, plot: Path | None) -> None:

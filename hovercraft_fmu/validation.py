@@ -3,7 +3,6 @@
 import os
 import platform
 import subprocess
-import sys
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -94,7 +93,7 @@ def _host_check(host: hosts.Host, path: Path, expected: list[list[float]]) -> Ch
 
 
 def _fmutool_problems(path: Path) -> list[str]:
-    command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", str(path), "-check"]
+    command = hosts.module_command("fmu_manipulation_toolbox", "-input", str(path), "-check")
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     lines = (done.stdout + done.stderr).splitlines()
     problems = [line for line in lines if line.startswith(("ERROR", "WARNING", "CRITICAL", "FATAL"))]

@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
+from rich.console import Group
+from rich.table import Table
 
+from hovercraft_fmu.cli import OUTPUT
 from hovercraft_fmu.scenes import SCENES
 
 
@@ -31,6 +34,16 @@ class Shell:
 @pytest.fixture
 def shell(tmp_path: Path) -> Shell:
     return Shell(tmp_path)
+
+
+def test_hints_are_printed_as_they_stand() -> None:
+    """rich takes [plot] for markup where it may."""
+    hint = "pip install 'hovercraft-fmu[plot]'"
+    table = Table(hint, title=hint, box=None)
+    table.add_row(hint)
+    with OUTPUT.capture() as printed:
+        OUTPUT.print(Group(hint, table))
+    assert printed.get().count(hint) == 4
 
 
 def test_bare_command_helps(shell: Shell) -> None:

@@ -26,6 +26,7 @@ from hovercraft_fmu.view.drive import drive, plan_drive
 from hovercraft_fmu.view.operator import TIME_SCALE
 from hovercraft_fmu.view.palette import HULL, WARNING
 from hovercraft_fmu.view.window import BAR, SIZE, VIEW_LENGTHS
+from tests.conftest import Fresh
 
 Picture = NDArray[np.uint8]
 """Red, green, blue; shape (height, width, 3)."""
@@ -319,3 +320,16 @@ def test_the_outline_is_that_of_the_model() -> None:
     from hovercraft_fmu.model.craft import Craft
 
     assert set(outline(Craft())) == {(15.0, 0.0), (10.0, 5.0), (-10.0, 5.0), (-10.0, -5.0), (10.0, -5.0)}
+
+
+def test_pygame_in_the_place_of_pygame_ce_is_said_with_the_way_out(fresh: Fresh, tmp_path: Path) -> None:
+    """Both have one module: installed over one another they are neither."""
+    (tmp_path / "pygame.py").write_text("")
+    code = """
+try:
+    import hovercraft_fmu.view.window
+except ModuleNotFoundError as error:
+    print(error)
+"""
+    printed = fresh(code, env={"PYTHONPATH": str(tmp_path)})
+    assert "pip uninstall -y pygame pygame-ce, then pip install 'hovercraft-fmu[drive]'" in printed

@@ -2,6 +2,8 @@
 
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,7 +13,7 @@ from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu import document
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from hovercraft_fmu.fmu.document import pages
-from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, HOSTS, hosts_of, run_in
+from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, HOSTS, hosts_of, module_command, run_in
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.observation import observe_motion
@@ -31,6 +33,21 @@ def test_every_host_gives_the_bits_of_the_bare_model(name: str, fmu: Path) -> No
         state = advance(state, Controls(*controls), Craft(), COMMUNICATION_STEP).state
         expected.append([*state, *observe_motion(state)])
     assert run_in(name, fmu) == expected
+
+
+@pytest.mark.parametrize("started", ["hovercraft_fmu.hosts", "fmu_manipulation_toolbox"])
+def test_a_host_runs_no_module_of_the_current_folder(
+    started: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`validate --table` once ran an fmpy.py that lay there."""
+    for name in ("fmpy", "numpy", "json", "runpy", started):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('a module of the current folder')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend("")
+    done = subprocess.run(module_command(started, "-h"), capture_output=True, text=True, check=False)
+    assert "a module of the current folder" not in done.stderr
+    as_before = subprocess.run([sys.executable, "-m", started], capture_output=True, text=True, check=False)
+    assert "a module of the current folder" in as_before.stderr
 
 
 def _without_versions(table: str) -> list[list[str]]:

@@ -72,7 +72,7 @@ def test_a_compiler_that_is_left_out_or_another(
     assert done.exit_code == 1
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["Hovercraft.fmu"]
     last = done.output.splitlines()[-1]
-    assert last.startswith("Error: HovercraftNative.fmu was not written: no machine code of HovercraftNative: ")
+    assert last.startswith("Error: not written: HovercraftNative.fmu; no machine code: ")
     assert says in last
     assert "pip install" in last
     assert files_of(nothing_compiled) == {"why_not.txt"}

@@ -90,7 +90,7 @@ class Library:
 
     @property
     def _missing(self) -> str:
-        return f"no machine code of {self.name}: {why_not()}; {HOW}"
+        return f"no machine code: {why_not()}; {HOW}"
 
     def path(self, platform: str) -> Path:
         """Of the library for a platform. Raises NotCompiledError."""

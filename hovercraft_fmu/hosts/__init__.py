@@ -117,12 +117,21 @@ def run_in(host: str, fmu: Path) -> list[list[float]]:
 
 def run(arguments: list[str], cwd: Path | None = None) -> list[list[float]]:
     """What `python -m hovercraft_fmu.hosts` prints with these arguments. Raises HostError where that fails."""
-    command = [sys.executable, "-m", "hovercraft_fmu.hosts", *arguments]
+    command = module_command("hovercraft_fmu.hosts", *arguments)
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, timeout=300)
     if done.returncode != 0:
         raise HostError(f"exit status {done.returncode}: {done.stderr.strip()[-500:]}")
     rows: list[list[float]] = json.loads(done.stdout.splitlines()[-1])
     return rows
+
+
+def module_command(module: str, *arguments: str) -> list[str]:
+    """As `python -m module`, with the modules of this process alone, not with an fmpy.py of the current folder."""
+    home = str(Path(__file__).parents[2])
+    places = [place for place in sys.path if place == home or place not in ("", ".", os.getcwd())]
+    code = f"import sys; sys.path[:] = {places!r}; import runpy; "
+    code += f"runpy.run_module({module!r}, run_name='__main__', alter_sys=True)"
+    return [sys.executable, "-I", "-c", code, *arguments]
 
 
 # ---- what runs in the process of its own

@@ -19,6 +19,7 @@ from rich.table import Table
 from ..fmu.interface import STATES
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
+from ..hosts import module_command
 from ..simulation import plan
 from ..sweep.runner import BATCH, FMU, Tell, sweep
 from ..sweep.study import read_study
@@ -92,7 +93,7 @@ def measure(
     for done, case in enumerate(cases, 1):
         with tempfile.TemporaryDirectory(prefix="hovercraft_sweep_") as output:
             fmu = native if case.way in (FMPY, NATIVE) else python
-            command = [sys.executable, "-m", __name__, json.dumps(case), str(fmu), output]
+            command = module_command(__name__, json.dumps(case), str(fmu), output)
             made = subprocess.run(command, capture_output=True, text=True, check=False)
         if made.returncode != 0:
             raise OSError(f"measuring {case} failed: {made.stderr.strip()}")

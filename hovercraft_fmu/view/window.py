@@ -15,12 +15,16 @@ from .shapes import jets
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 try:
-    import pygame as pygame  # the drive's loop takes it from here, with this message
-    from pygame import IS_CE as IS_CE  # pygame itself, which has the same name, has no such thing
+    import pygame as pygame  # the drive's loop takes it from here, with these messages
 except ImportError as error:
     raise ModuleNotFoundError(
         "the window needs pygame-ce, which is not installed: pip install 'hovercraft-fmu[drive]'"
     ) from error
+if not getattr(pygame, "IS_CE", False):
+    raise ModuleNotFoundError(
+        "the window needs pygame-ce, in whose place pygame is installed, of the same name: "
+        "pip uninstall -y pygame pygame-ce, then pip install 'hovercraft-fmu[drive]'"
+    )
 
 SIZE = (1280, 720)
 """pixels, at the start"""
