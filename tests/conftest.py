@@ -17,6 +17,7 @@ from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all
 from hovercraft_fmu.fmu.native_package import build_native_fmu
 from tests.lowlevel import one
+from tests.shell import Shell
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -164,6 +165,13 @@ def fresh(tmp_path: Path) -> Fresh:
         return done.stdout
 
     return run
+
+
+@pytest.fixture
+def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Shell:
+    """An empty folder to type the command in."""
+    monkeypatch.chdir(tmp_path)
+    return Shell(tmp_path, capsys.readouterr)
 
 
 skipped: list[str] = []
