@@ -1,7 +1,8 @@
-"""The pages that ship inside the FMU, from their templates, the table of variables and the committed measurements."""
+"""The pages that ship inside the FMU, from their templates and the table of variables.
 
-import csv
-from collections import defaultdict
+Those of measurements, results.html and sweeps.html with their pictures, are there as `studies/pages.py` wrote them.
+"""
+
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,15 +13,10 @@ from .._version import __version__
 from ..model.craft import DRAG_AREAS, PRESETS
 from ..model.integrators import INTEGRATORS
 from .description import FMI_3_TYPES, NATIVE, NATIVE3, PYTHON, Flavour
-from .interface import ACTION, MOTION, STATES, VARIABLES, WARNINGS, WATCHED
+from .interface import VARIABLES, WARNINGS
 from .variable import Variable
 
 FOLDER = Path(__file__).parent / "documentation"
-RESULTS = Path(__file__).parent.parent / "studies" / "results"
-"""What `hovercraft-fmu trade` and `hovercraft-fmu stability` wrote, with `--output` there."""
-STUDY = Path(__file__).parent.parent / "sweep" / "studies" / "turning_circle.toml"
-"""The study that the page on sweeps explains."""
-
 CHECKED: Mapping[str, str] = {
     PYTHON.identifier: "checked.md",
     NATIVE.identifier: "checked_native.md",
@@ -43,10 +39,6 @@ def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
         "presets": PRESETS,
         "drag_areas": DRAG_AREAS,
         "checked": _checked(FOLDER / CHECKED[flavour.identifier]),
-        "measured": _all_measured(),
-        "machine": _machine(),
-        "study": STUDY.read_text(encoding="utf-8"),
-        "observed": (*STATES, *MOTION, *ACTION, *WATCHED),
     }
     return rendered(FOLDER, values)
 
@@ -54,14 +46,16 @@ def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
 def documents(flavour: Flavour) -> dict[str, bytes]:
     """All of documentation/ but licences of others, for one of the hovercraft's FMUs: path -> content."""
     static = {
-        path.relative_to(FOLDER).as_posix(): path.read_bytes()
-        for path in sorted(FOLDER.rglob("*"))
-        if path.is_file()
-        and path.suffix != ".jinja"
-        and not (flavour.sources and path.name == "externalDependencies.txt")
+        path.relative_to(FOLDER).as_posix(): path.read_bytes() for path in sorted(FOLDER.rglob("*")) if _goes(path)
     }
-    measured = {f"results/{path.name}": path.read_bytes() for path in sorted(RESULTS.glob("*"))}
-    return {**static, **measured, **{name: page.encode() for name, page in pages(flavour).items()}}
+    if flavour.sources:
+        del static["externalDependencies.txt"]
+    return {**static, **{name: page.encode() for name, page in pages(flavour).items()}}
+
+
+def _goes(path: Path) -> bool:
+    """Whether a file goes in as it is: tables of checks are on a page."""
+    return path.is_file() and path.suffix not in (".jinja", ".md")
 
 
 def rendered(folder: Path, values: Mapping[str, Any]) -> dict[str, str]:
@@ -81,29 +75,6 @@ def _checked(table: Path) -> list[list[str]]:
     """The rows of a table of checks, titles first; none for what was not checked yet: checking needs a build."""
     lines = table.read_text(encoding="utf-8").splitlines() if table.exists() else []
     return [line.strip("| ").split(" | ") for line in lines if not line.startswith("| ---")]
-
-
-def _all_measured() -> dict[str, list[dict[str, str]]]:
-    """Table -> rows; none for a table that was not measured yet: the measuring builds an FMU, too."""
-    return defaultdict(list, {path.stem: _measured(path) for path in sorted(RESULTS.glob("*.csv"))})
-
-
-def _machine() -> str:
-    path = RESULTS / "machine.txt"
-    return path.read_text(encoding="utf-8").strip() if path.exists() else ""
-
-
-def _measured(path: Path) -> list[dict[str, str]]:
-    """The rows of a CSV file, numbers short enough to read."""
-    with path.open(newline="", encoding="utf-8") as file:
-        return [{name: _short(text) for name, text in row.items()} for row in csv.DictReader(file)]
-
-
-def _short(text: str) -> str:
-    try:
-        return f"{float(text):.3g}"
-    except ValueError:
-        return text
 
 
 def _limits(variable: Variable) -> str:

@@ -1,0 +1,121 @@
+"""python -m hovercraft_fmu.studies.pages: the pages of measurements that ship inside the FMUs, and all their pictures.
+
+They are committed where the builder packs them, so that it needs nothing of the laboratory. Run it (a minute) when a
+table, a picture or a template has changed; a test holds what is committed equal to the tables.
+"""
+
+import csv
+import io
+import tempfile
+from collections import defaultdict
+from collections.abc import Mapping
+from pathlib import Path
+
+from PIL import Image, PngImagePlugin
+
+from ..autopilot import pilot_package
+from ..coupling import sail
+from ..fmu.archive import digest
+from ..fmu.document import FOLDER as PACKED
+from ..fmu.document import rendered
+from ..fmu.interface import ACTION, MOTION, STATES, WATCHED
+from ..fmu.python_package import build_fmu
+from ..model.integrators import INTEGRATORS
+from ..scenes import CONTROL_LOGS, SCENES, VOYAGES
+from ..simulation import plan, run_model
+from ..sweep import sweep
+from ..sweep.plots import plot_sweep
+from ..sweep.study import SHIPPED
+from ..view.plots import plot_passage, plot_run
+
+HERE = Path(__file__).parent
+RESULTS = HERE / "results"
+"""What `hovercraft-fmu measure` wrote, with `--output` there; the pictures it leaves there are not committed."""
+PICTURES: Mapping[str, tuple[Path, ...]] = {
+    "ice.png": (CONTROL_LOGS / "ice.csv",),
+    "turning_circle.png": (SHIPPED / "turning_circle.toml", SHIPPED / "turning_circle.csv"),
+    "work_precision.png": (RESULTS / "work_precision.csv",),
+    "coupling.png": (RESULTS / "coupling.csv",),
+    "stability.png": (RESULTS / "stability.csv", RESULTS / "extremes.csv"),
+    "scene_terms.png": (RESULTS / "scene_terms.csv",),
+}
+"""Each picture of the pages, and what it shows."""
+COLORS = 32
+"""Of a picture's palette: lines and markers need few."""
+SHOWS = "Shows"
+"""The key in a picture under which it says what it shows."""
+
+
+def pages() -> dict[str, bytes]:
+    """Path inside the documentation -> the whole page."""
+    values = {
+        "integrators": INTEGRATORS,
+        "measured": _measured(),
+        "machine": (RESULTS / "machine.txt").read_text(encoding="utf-8").strip(),
+        "study": (SHIPPED / "turning_circle.toml").read_text(encoding="utf-8"),
+        "observed": (*STATES, *MOTION, *ACTION, *WATCHED),
+    }
+    return {name: page.encode() for name, page in rendered(HERE, values).items()}
+
+
+def shown(name: str) -> str:
+    """A digest of what a picture shows."""
+    return digest({path.name: path.read_bytes() for path in PICTURES[name]})
+
+
+def in_palette(picture: Path, shows: str) -> bytes:
+    """A PNG as small as it can be, which says what it shows."""
+    with Image.open(picture) as colored:
+        image = colored.convert("RGB").quantize(COLORS, Image.Quantize.MEDIANCUT, kmeans=6, dither=Image.Dither.NONE)
+    note, content = PngImagePlugin.PngInfo(), io.BytesIO()
+    note.add_text(SHOWS, shows)
+    image.save(content, "PNG", optimize=True, pnginfo=note)
+    return content.getvalue()
+
+
+def assemble(results: Path = RESULTS) -> list[Path]:
+    """Write the pages and pictures to where the builders pack them, of the measured ones those that `results` has."""
+    files = {PACKED / name: content for name, content in pages().items()}
+    with tempfile.TemporaryDirectory() as folder:
+        _draw(Path(folder))
+        for name in PICTURES:
+            picture = next((each / name for each in (Path(folder), results) if (each / name).exists()), None)
+            if picture:
+                files[PACKED / name] = in_palette(picture, shown(name))
+        files[pilot_package.HERE / pilot_package.PICTURE] = in_palette(Path(folder) / pilot_package.PICTURE, "")
+    for path, content in files.items():
+        path.write_bytes(content)
+    return list(files)
+
+
+def _draw(folder: Path) -> None:
+    """What is drawn anew each time: it takes seconds."""
+    ice = plan(CONTROL_LOGS / "ice.csv", preset="ice", communication_step=SCENES["ice"].communication_step)
+    plot_run(run_model(ice), folder / "ice.png")
+    fmu, autopilot = build_fmu(folder / "Hovercraft.fmu"), pilot_package.build_autopilot(folder / "Autopilot.fmu")
+    plot_passage(sail(VOYAGES["crosswind"], fmu, autopilot), folder / pilot_package.PICTURE)
+    study = SHIPPED / "turning_circle.toml"
+    plot_sweep(sweep(study, engine="batch", workers=1, output=folder / "sweep").folder, folder / "turning_circle.png")
+
+
+def _measured() -> dict[str, list[dict[str, str]]]:
+    """Table -> rows; none for a table that was not measured yet."""
+    return defaultdict(list, {path.stem: _rows(path) for path in sorted(RESULTS.glob("*.csv"))})
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    """The rows of a CSV file, numbers short enough to read."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [{name: _short(text) for name, text in row.items()} for row in csv.DictReader(file)]
+
+
+def _short(text: str) -> str:
+    try:
+        return f"{float(text):.3g}"
+    except ValueError:
+        return text
+
+
+if __name__ == "__main__":
+    for written in assemble():
+        print(f"wrote {written}")
