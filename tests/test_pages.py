@@ -8,11 +8,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.document import FOLDER
-from hovercraft_fmu.fmu.native_package import build_native_fmu
 from hovercraft_fmu.studies.pages import PICTURES, SHOWS, pages, shown
-from tests.conftest import Built
 
 SIZE_MAX, DOCUMENTS_MAX = 600_000, 15
 
@@ -27,18 +24,6 @@ class Links(HTMLParser):
 
     def handle_starttag(self, _tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.found |= {value for name, value in attrs if name in ("href", "src") and value}
-
-
-@pytest.fixture(
-    scope="module", params=["fmu", "autopilot", NATIVE, NATIVE3], ids=lambda made: getattr(made, "identifier", made)
-)
-def complete(request: pytest.FixtureRequest, built: Built) -> Path:
-    """Each FMU that is shipped, for all its platforms."""
-    flavour = request.param
-    if isinstance(flavour, Flavour):
-        return built(f"{flavour.identifier}Complete.fmu", lambda path: build_native_fmu(path, flavour))
-    made: Path = request.getfixturevalue(flavour)
-    return made
 
 
 def documentation(fmu: Path) -> dict[str, bytes]:
@@ -61,17 +46,20 @@ def test_the_pictures_show_what_the_tables_say(name: str) -> None:
         assert picture.info[SHOWS] == shown(name)
 
 
-def test_all_that_is_referred_to_is_there_and_all_that_is_there_is_referred_to(complete: Path) -> None:
-    files = documentation(complete)
+@pytest.mark.parametrize("name", ["fmu", "autopilot"])
+def test_the_documentation_of_a_python_fmu_is_complete_and_small(name: str, request: pytest.FixtureRequest) -> None:
+    assert_complete_and_small(request.getfixturevalue(name))
+
+
+def test_the_documentation_of_a_native_fmu_is_complete_and_small(complete_native_fmu: Path) -> None:
+    assert_complete_and_small(complete_native_fmu)
+
+
+def assert_complete_and_small(fmu: Path) -> None:
+    """All that is referred to is there, all that is there is referred to, and no raw table is among it."""
+    files = documentation(fmu)
     links = {each for name, page in files.items() if name.endswith(".html") for each in Links(page.decode()).found}
-    inside = {link for link in links if not re.match("https?:", link)}
-    assert inside | {"index.html"} == files.keys() | {"index.html"}
-
-
-def test_an_fmu_is_small(complete: Path) -> None:
-    assert len(documentation(complete)) <= DOCUMENTS_MAX
-    assert complete.stat().st_size < SIZE_MAX
-
-
-def test_no_raw_tables_are_packed(complete: Path) -> None:
-    assert {Path(name).suffix for name in documentation(complete)} <= {".html", ".css", ".png", ".txt"}
+    assert {link for link in links if not re.match("https?:", link)} | {"index.html"} == files.keys()
+    assert {Path(name).suffix for name in files} <= {".html", ".css", ".png", ".txt"}
+    assert len(files) <= DOCUMENTS_MAX
+    assert fmu.stat().st_size < SIZE_MAX
