@@ -8,9 +8,12 @@ import csv
 import io
 import tempfile
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import polars as pl
+from matplotlib import rc_context
 from PIL import Image, PngImagePlugin
 
 from ..autopilot import pilot_package
@@ -27,6 +30,10 @@ from ..sweep import sweep
 from ..sweep.plots import plot_sweep
 from ..sweep.study import SHIPPED
 from ..view.plots import plot_passage, plot_run
+from . import closed_loop, scene_terms
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"
@@ -34,12 +41,17 @@ RESULTS = HERE / "results"
 PICTURES: Mapping[str, tuple[Path, ...]] = {
     "ice.png": (CONTROL_LOGS / "ice.csv",),
     "turning_circle.png": (SHIPPED / "turning_circle.toml", SHIPPED / "turning_circle.csv"),
-    "work_precision.png": (RESULTS / "work_precision.csv",),
-    "coupling.png": (RESULTS / "coupling.csv",),
     "stability.png": (RESULTS / "stability.csv", RESULTS / "extremes.csv"),
-    "scene_terms.png": (RESULTS / "scene_terms.csv",),
+    "work_precision.svg": (RESULTS / "work_precision.csv",),
+    "coupling.svg": (RESULTS / "coupling.csv",),
+    "scene_terms.svg": (RESULTS / "scene_terms.csv",),
 }
 """Each picture of the pages, and what it shows."""
+DRAWN: Mapping[str, Callable[[pl.DataFrame], "Figure"]] = {
+    "coupling.svg": closed_loop.draw,
+    "scene_terms.svg": scene_terms.draw,
+}
+"""Those that are drawn of their table alone."""
 COLORS = 32
 """Of a picture's palette: lines and markers need few."""
 SHOWS = "Shows"
@@ -73,19 +85,33 @@ def in_palette(picture: Path, shows: str) -> bytes:
     return content.getvalue()
 
 
+def lines(figure: "Figure", shows: str) -> bytes:
+    """An SVG, which says what it shows; the same bytes each time."""
+    content = io.BytesIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hovercraft"}):
+        figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None, "Source": shows})
+    return content.getvalue()
+
+
 def assemble(results: Path = RESULTS) -> list[Path]:
-    """Write the pages and pictures to where the builders pack them, of the measured ones those that `results` has."""
+    """Write the pages and pictures to where the builders pack them.
+
+    A picture that shows more than its table does is taken from `results`; without it the old one stays.
+    """
     files = {PACKED / name: content for name, content in pages().items()}
+    for name, draw in DRAWN.items():
+        (table,) = PICTURES[name]
+        files[PACKED / name] = lines(draw(pl.read_csv(table)), shown(name))
     with tempfile.TemporaryDirectory() as folder:
         _draw(Path(folder))
-        for name in PICTURES:
+        for name in PICTURES.keys() - DRAWN.keys():
             picture = next((each / name for each in (Path(folder), results) if (each / name).exists()), None)
             if picture:
                 files[PACKED / name] = in_palette(picture, shown(name))
         files[pilot_package.HERE / pilot_package.PICTURE] = in_palette(Path(folder) / pilot_package.PICTURE, "")
     for path, content in files.items():
         path.write_bytes(content)
-    return list(files)
+    return sorted(files)
 
 
 def _draw(folder: Path) -> None:

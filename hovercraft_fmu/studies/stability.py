@@ -292,7 +292,7 @@ def study(quick: bool, tell: Tell) -> Findings:
     runs, size = (1024, 256) if quick else (65536, BATCH)
     extremes = measure_extremes(runs, size=size, tell=part(tell, 0.5, 0.95))
     rows = shares(pl.concat([extremes, measure_adaptive(100 if quick else 1000)]))
-    figure = new_figure(figsize=(15.0, 5.2), dpi=110, layout="constrained")
+    figure = new_figure(figsize=(13.0, 4.6), dpi=75, layout="constrained")
     draw(figure, extremes)
     tell(1.0)
     bounds = [f"bound of {name}: {each.constant:g}*{each.text}" for name, each in FORMULAS.items()]
