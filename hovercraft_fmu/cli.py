@@ -34,7 +34,7 @@ from .fmu.python_package import build_fmu
 from .host import SimulationError
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES, VOYAGES
-from .simulation import DEFAULT_FMU, Inputs, Result, default_fmu, plan, simulate
+from .simulation import DEFAULT_FMU, Inputs, Result, default_fmu, plan, run_fmu
 from .studies import STUDIES, carry_out
 from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE
@@ -431,9 +431,9 @@ def _measure(study: Callable[[Path, Callable[[float], None]], Group], output: Pa
 
 
 def _simulated(inputs: Inputs, fmu: Path | None, **options: Any) -> Result:
-    stop_time = plan(inputs, **options).stop_time
-    with _progress(stop_time) as progress:
-        return simulate(inputs, fmu, progress=progress, **options)
+    run = plan(inputs, **options)
+    with _progress(run.stop_time) as progress:
+        return run_fmu(run, fmu or default_fmu(), progress)
 
 
 def _validated(fmu: Path) -> int:

@@ -2,27 +2,24 @@
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from .autopilot.guidance import Commands, Gains, Pilot, Sight, Waypoint, steer
 from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
 from .autopilot.pilot_package import build_autopilot
 from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
-from .fmu.variable import Model
-from .host import SimulationError
+from .host import Fmu, Instance
 from .model.craft import Craft
 from .model.dynamics import Controls, State
 from .model.subcycling import Settings, advance
 from .scenes import Voyage, voyage
-from .simulation import Progress, default_fmu, loaded, path_length, write_csv
+from .simulation import Progress, default_fmu, path_length, write_csv
 
 JACOBI, GAUSS_SEIDEL = SCHEMES = ("jacobi", "gauss_seidel")
 """Both parts step side by side, with what the other one showed before; or the autopilot steps first, and the craft
@@ -117,18 +114,16 @@ def sail(
     chosen = _chosen(which)
     if autopilot is None:
         autopilot = DEFAULT_AUTOPILOT if DEFAULT_AUTOPILOT.exists() else build_autopilot(DEFAULT_AUTOPILOT)
-    messages: list[str] = []
-    with ExitStack() as stack:
-        craft, pilot = (
-            stack.enter_context(_part(Path(path), model, messages))
-            for path, model in ((fmu or default_fmu(), HOVERCRAFT), (autopilot, AUTOPILOT_MODEL))
-        )
-        try:
-            craft.start(chosen.craft)
-            pilot.start({name: chosen.craft[name] for name in STATES if name in chosen.craft})
-            return _sail(craft, pilot, chosen, scheme, communication_step, stop_time, progress)
-        except FMICallException as error:
-            raise SimulationError("; ".join(messages) or str(error)) from error
+    with (
+        Fmu(fmu or default_fmu(), HOVERCRAFT.name) as craft_fmu,
+        Fmu(autopilot, AUTOPILOT_MODEL.name) as pilot_fmu,
+        craft_fmu.instance() as craft,
+        pilot_fmu.instance() as pilot,
+    ):
+        craft.start(chosen.craft)
+        pilot.start({name: chosen.craft[name] for name in STATES if name in chosen.craft})
+        parts = FmuPart(craft, STATES, COMMANDS), FmuPart(pilot, OUTPUTS, STATES)
+        return _sail(*parts, chosen, scheme, communication_step, stop_time, progress)
 
 
 def sail_bare(
@@ -201,48 +196,22 @@ def master(
 
 
 class FmuPart:
-    """An instance of an FMU, through fmpy."""
+    """An instance of an FMU."""
 
-    def __init__(self, instance: Any, model: Model) -> None:
-        self.instance, self.by_name = instance, model.by_name
-        craft = model is HOVERCRAFT
-        self.shown = [self.by_name[name] for name in (STATES if craft else OUTPUTS)]
-        self.taken = [self.by_name[name].reference for name in (COMMANDS if craft else STATES)]
-        self.getters = {"Real": instance.getReal, "Integer": instance.getInteger, "Boolean": instance.getBoolean}
-        self.setters = {"Real": instance.setReal, "Enumeration": instance.setInteger}
-
-    def start(self, values: Mapping[str, float]) -> None:
-        """Set start values and initialize."""
-        self.instance.setupExperiment()
-        for name, value in values.items():
-            variable = self.by_name[name]
-            self.setters[variable.kind]([variable.reference], [value])
-        self.instance.enterInitializationMode()
-        self.instance.exitInitializationMode()
+    def __init__(self, instance: Instance, shown: Sequence[str], taken: Sequence[str]) -> None:
+        self._instance, self._shown, self._taken = instance, instance.port(*shown), instance.port(*taken)
 
     def read(self) -> Sequence[float]:
-        """See Part; of every type in one call."""
-        found: dict[str, float] = {}
-        for kind, get in self.getters.items():
-            of_kind = [v for v in self.shown if v.kind == kind]
-            if of_kind:
-                values = get([v.reference for v in of_kind])
-                found.update(zip((v.name for v in of_kind), values, strict=True))
-        return [found[v.name] for v in self.shown]
+        """See Part."""
+        return self._shown.get()
 
     def write(self, values: Sequence[float]) -> None:
         """See Part."""
-        self.instance.setReal(self.taken, values)
+        self._taken.set(values)
 
     def step(self, time: float, duration: float) -> None:
         """See Part."""
-        self.instance.doStep(time, duration)
-
-
-@contextmanager
-def _part(path: Path, model: Model, messages: list[str]) -> Iterator[FmuPart]:
-    with loaded(path, messages, model.name, versions=("2.0",)) as (_, instance, _):
-        yield FmuPart(instance, model)
+        self._instance.step(time, duration)
 
 
 # ---- the parts as bare functions

@@ -15,8 +15,7 @@ from lxml import etree
 
 from . import hosts
 from .fmu.interface import HOVERCRAFT
-from .host import SimulationError
-from .simulation import instantiated, read_description
+from .host import Fmu, SimulationError, read_description
 
 STEPS = 5
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
@@ -120,13 +119,12 @@ def _run_problems(path: Path, description: Any, exchange: bool = False) -> list[
     """A description can be clean and the binary still not load: only a run shows it."""
     experiment = description.defaultExperiment
     step = float(experiment.stepSize if experiment and experiment.stepSize else 0.01)
-    messages: list[str] = []
     try:
-        with instantiated(path, description, messages, exchange) as (folder, instance):
+        with Fmu(path) as fmu, fmu.instance(exchange) as instance, instance.driven_by_fmpy():
             rows = fmpy.simulate_fmu(
-                folder,
+                fmu.folder,
                 model_description=description,
-                fmu_instance=instance,
+                fmu_instance=instance.fmpy,
                 fmi_type="ModelExchange" if exchange else "CoSimulation",
                 start_time=0.0,
                 stop_time=STEPS * step,
@@ -135,9 +133,7 @@ def _run_problems(path: Path, description: Any, exchange: bool = False) -> list[
             )
     except SimulationError as error:
         return [str(error)]
-    except Exception as error:  # whatever fmpy raises of a call that failed
-        return ["; ".join(messages) or str(error)]
     problems = [] if len(rows) == STEPS + 1 else [f"{len(rows) - 1} steps were made: must be {STEPS}"]
     unbounded = [name for name in rows.dtype.names if not np.isfinite(rows[name]).all()]
-    problems += messages if exchange else []  # of a refused call inside the solver, no exception comes through
+    problems += instance.messages if exchange else []  # of a refused call inside the solver, no exception comes through
     return problems + [f"{name}: must be finite in every step" for name in unbounded]

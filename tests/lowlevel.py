@@ -5,10 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fmpy import fmi2, fmi3
-
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, VARIABLES
-from hovercraft_fmu.simulation import CALLBACKS, instantiated, is_fmi_3, read_description
+from hovercraft_fmu.host import Fmu, Instance
 
 REALS = [v for v in VARIABLES if v.kind == "Real"]
 INTEGERS = [v for v in VARIABLES if v.kind != "Real"]
@@ -126,25 +124,19 @@ def worded(instance: Any, message: str) -> str:
 @contextmanager
 def one(fmu: Path, exchange: bool = False) -> Iterator[tuple[Any, list[str]]]:
     """An instance, for co-simulation or model exchange, and the messages that come from it."""
-    messages: list[str] = []
-    with instantiated(fmu, read_description(fmu), messages, exchange) as (_, instance):
-        yield Instance3(instance) if is_fmi_3(instance) else instance, messages
+    with Fmu(fmu) as opened, opened.instance(exchange) as instance:
+        yield _low_level(instance, opened), instance.messages
+
+
+def _low_level(instance: Instance, opened: Fmu) -> Any:
+    made = instance.fmpy
+    made.host, made.opened = instance, opened  # which live as long
+    return Instance3(made) if opened.is_fmi_3 else made
 
 
 def another(instance: Any) -> Any:
     """A further instance of the same extracted FMU."""
-    kind = fmi3.FMU3Slave if isinstance(instance, Instance3) else fmi2.FMU2Slave
-    made = kind(
-        guid=instance.guid,
-        unzipDirectory=instance.unzipDirectory,
-        modelIdentifier=instance.modelIdentifier,
-        instanceName="another",
-    )
-    if isinstance(instance, Instance3):
-        made.instantiate(loggingOn=True)
-        return Instance3(made)
-    made.instantiate(callbacks=CALLBACKS, loggingOn=True)
-    return made
+    return _low_level(instance.opened.instance(), instance.opened)
 
 
 def kept(instance: Any, through_bytes: bool) -> Any:

@@ -18,8 +18,9 @@ from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES
 from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import Result, Run, instantiated, plan, read_description, run_fmu, run_model
+from hovercraft_fmu.simulation import Result, Run, plan, read_description, run_fmu, run_model
 from tests.conftest import Fresh
+from tests.lowlevel import get, one, reference, start
 
 COLUMNS = (*INPUTS, *STATES, *MOTION, *ACTION, *WATCHED, "substeps")
 SIMULATE_ALL = """
@@ -33,10 +34,6 @@ for name, run in runs.items():
 assert not [name for name in sys.modules if name.startswith("hovercraft_fmu")]
 print("absent" if __import__("importlib.util").util.find_spec("hovercraft_fmu") is None else "installed")
 """
-
-
-def reference(name: str) -> int:
-    return BY_NAME[name].reference
 
 
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -209,18 +206,8 @@ def test_what_is_inside(fmu: Path) -> None:
 
 @pytest.fixture
 def instance(fmu: Path) -> Iterator[Any]:
-    with instantiated(fmu, read_description(fmu), []) as (_, made):
+    with one(fmu) as (made, _):
         yield made
-
-
-def start(instance: Any, time: float = 0.0) -> None:
-    instance.setupExperiment(startTime=time)
-    instance.enterInitializationMode()
-    instance.exitInitializationMode()
-
-
-def get(instance: Any, *names: str) -> list[float]:
-    return list(instance.getReal([reference(name) for name in names]))
 
 
 def test_outputs_belong_to_the_communication_point(instance: Any) -> None:

@@ -9,8 +9,9 @@ import pytest
 
 import hovercraft_fmu
 from hovercraft_fmu.host import SimulationError
+from hovercraft_fmu.host.messages import plain
 from hovercraft_fmu.scenes import SCENES, signals
-from hovercraft_fmu.simulation import plain, plan, read_inputs, run_fmu, run_model
+from hovercraft_fmu.simulation import plan, read_inputs, run_fmu, run_model
 
 
 def write(path: Path, text: str) -> Path:

@@ -1,6 +1,6 @@
 """The one way in which this package drives an FMU, of its own or of anyone else: see `Fmu` and `Instance`."""
 
-from .archive import Fmu, read_description
+from .fmu_file import Fmu, read_description
 from .instance import Instance, Port, SimulationError
 
 __all__ = ["Fmu", "Instance", "Port", "SimulationError", "read_description"]

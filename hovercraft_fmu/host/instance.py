@@ -1,6 +1,7 @@
 """The class that drives an instance of an FMU, of FMI 2.0 or 3.0, for co-simulation or model exchange."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from ctypes import byref, c_bool, c_double, c_int
 from functools import cached_property
 from types import TracebackType
@@ -158,6 +159,14 @@ class Instance:
                 raise
             self.check(status)
             raise
+
+    @contextmanager
+    def driven_by_fmpy(self) -> Iterator[None]:
+        """Around one of fmpy's masters, which is given `fmpy`: what it raises becomes a SimulationError."""
+        try:
+            yield
+        except Exception as error:  # fmpy raises plain exceptions
+            raise SimulationError(self._log.refusal() or str(error)) from error
 
     # ---- start and step
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import fmpy
 
 from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
+from ..host import Fmu
 
 COMMUNICATION_STEP = 0.1
 """s"""
@@ -138,22 +139,15 @@ def module_command(module: str, *arguments: str) -> list[str]:
 
 
 def run_fmpy(fmu: Path) -> list[list[float]]:
-    """Through fmpy's low-level interface."""
-    return _driven(fmu, {variable.name: variable.reference for variable in VARIABLES})
-
-
-def _driven(fmu: Path, references: Mapping[str, int]) -> list[list[float]]:
-    from ..simulation import enter_initialization, get_reals, instantiated, read_description, set_reals
-
-    inputs, outputs = ([references[name] for name in names] for names in (INPUTS, OUTPUTS))
-    with instantiated(fmu, read_description(fmu), []) as (_, instance):
-        enter_initialization(instance)
-        instance.exitInitializationMode()
+    """Through fmpy, as this package drives an FMU."""
+    with Fmu(fmu) as opened, opened.instance() as craft:
+        inputs, outputs = craft.port(*INPUTS), craft.port(*OUTPUTS)
+        craft.start()
         rows = []
         for k, controls in enumerate(CONTROLS):
-            set_reals(instance, inputs, controls)
-            instance.doStep(k * COMMUNICATION_STEP, COMMUNICATION_STEP)
-            rows.append(get_reals(instance, outputs))
+            inputs.set(controls)
+            craft.step(k * COMMUNICATION_STEP, COMMUNICATION_STEP)
+            rows.append(outputs.get())
         return rows
 
 
@@ -210,8 +204,7 @@ def run_fmucontainer(fmu: Path) -> list[list[float]]:
         shutil.copy(fmu, work / "Hovercraft.fmu")
         content = {"name": "Container.fmu", "fmu": ["Hovercraft.fmu"], "step_size": COMMUNICATION_STEP}
         make_container(work, content, int(fmpy.read_model_description(fmu).fmiVersion[0]))
-        container = fmpy.read_model_description(work / "Container.fmu")
-        return _driven(work / "Container.fmu", {v.name: v.valueReference for v in container.modelVariables})
+        return run_fmpy(work / "Container.fmu")
 
 
 def make_container(folder: Path, content: Mapping[str, object], fmi: int = 2) -> None:

@@ -8,18 +8,17 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from fmpy import fmi2
-from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
-from ..fmu.interface import BY_NAME, INPUTS
+from ..fmu.interface import INPUTS
+from ..host import Fmu, SimulationError
 from ..model.dynamics import Controls
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
-from ..simulation import Run, instantiated, read_description
+from ..simulation import Run
 from .quantities import Keep, Record
 from .study import Samples
 from .timeline import Timeline, merged
@@ -62,57 +61,31 @@ SETTINGS = ("step_size", "integrator", "tolerance")
 
 
 class Driver:
-    """One instance of an FMU, reset and used again from run to run.
-
-    What fmpy's own calls make anew every time, arrays for ctypes, is made once here.
-    """
+    """One instance of an FMU, reset and used again from run to run."""
 
     def __init__(self, plan: Plan, fmu: bytes, swept: tuple[str, ...]) -> None:
-        self._plan, self._swept = plan, swept
-        self._folder = tempfile.TemporaryDirectory(prefix="hovercraft_sweep_")
-        self._path = Path(self._folder.name) / "swept.fmu"
-        self._path.write_bytes(fmu)
-        self._description = read_description(self._path, validate=False)
-        self._references = {v.name: v.valueReference for v in self._description.modelVariables}
-        self._stack, self._messages = ExitStack(), list[str]()
+        self._plan = plan
+        self._stack = ExitStack()
+        folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix="hovercraft_sweep_"))
+        path = Path(folder) / "swept.fmu"
+        path.write_bytes(fmu)
+        self._craft = self._stack.enter_context(self._stack.enter_context(Fmu(path)).instance())
         self._busy, self._over = threading.Lock(), False
         self._merged = lru_cache(maxsize=16)(partial(merged, plan.timeline.legs))
-        self._make_arrays()
-        self._instantiate()
+        names = tuple(dict.fromkeys((*plan.run.start_values, *swept)))
+        self._shared = {name: plan.run.value(name) for name in (*names, *SETTINGS)}
+        self._start_values, self._inputs = self._craft.port(*names), self._craft.port(*INPUTS)
+        self._driven = [(i, name) for i, name in enumerate(INPUTS) if name in swept]
+        self._warnings, self._read = self._craft.port("warnings"), self._craft.port(*plan.keep.read)
+        self._record = np.empty((len(plan.timeline.times), len(plan.keep.read)))
+        self._rows = [self._read.over(row) for row in self._record]
 
     def close(self) -> None:
         """Free the instance and delete what was extracted; where a run is on its way, after it."""
         self._over = True
         if self._busy.acquire(blocking=False):
             self._stack.close()
-            self._folder.cleanup()
             self._busy.release()
-
-    def _instantiate(self) -> None:
-        self._stack.close()
-        _, self._instance = self._stack.enter_context(instantiated(self._path, self._description, self._messages))
-        self._new = True
-
-    def _make_arrays(self) -> None:
-        run, names = self._plan.run, tuple(dict.fromkeys((*self._plan.run.start_values, *self._swept)))
-        self._shared = {name: run.value(name) for name in (*names, *SETTINGS)}
-        self._real_names = [name for name in names if BY_NAME[name].kind == "Real"]
-        self._integer_names = [name for name in names if BY_NAME[name].kind != "Real"]
-        self._reals = (fmi2.fmi2Real * len(self._real_names))()
-        self._integers = (fmi2.fmi2Integer * len(self._integer_names))()
-        self._real_references = self._of(self._real_names)
-        self._integer_references = self._of(self._integer_names)
-        self._input_references, self._inputs = self._of(INPUTS), (fmi2.fmi2Real * len(INPUTS))()
-        self._driven = [(i, name) for i, name in enumerate(INPUTS) if name in self._swept]
-        self._warned_reference, self._warned = self._of(["warnings"]), (fmi2.fmi2Integer * 1)()
-        read, points = self._plan.keep.read, len(self._plan.timeline.times)
-        self._read_references = self._of(read)
-        self._scratch = np.empty((points, len(read)))
-        row = fmi2.fmi2Real * len(read)
-        self._rows = [row.from_buffer(self._scratch, i * self._scratch.strides[0]) for i in range(points)]
-
-    def _of(self, names: Any) -> Any:
-        return (fmi2.fmi2ValueReference * len(names))(*(self._references[name] for name in names))
 
     def run(self, samples: Samples) -> Ran:
         """Make runs, one after the other. A run that the FMU refuses leaves its message, and the next one goes on."""
@@ -129,60 +102,41 @@ class Driver:
         columns = {name: column.tolist() for name, column in samples.items()}
         for i in range(count):
             values = self._shared | {name: column[i] for name, column in columns.items()}
-            self._messages.clear()
             try:
                 with _interrupt_afterwards():
                     self._one(values)
-            except Exception as error:  # fmpy raises plain exceptions
-                ran.errors[i] = "; ".join(self._messages) or str(error)
-                if getattr(error, "status", fmi2.fmi2Fatal) != fmi2.fmi2Error:
-                    self._instantiate()  # the standard: nothing but freeing it is allowed
-                continue
-            ran.record[i] = self._scratch
-            ran.warnings[i] = self._warned[0]
+                ran.record[i] = self._record
+                (ran.warnings[i],) = self._warnings.get()
+            except (SimulationError, ValueError) as error:
+                ran.errors[i] = str(error)
+            self._craft.messages.clear()
+            self._craft.reset()
         return ran
 
     def _one(self, values: Mapping[str, float | int]) -> None:
-        instance, timeline = self._instance, self._plan.timeline
-        component, read = instance.component, len(self._plan.keep.read)
-        if not self._new:
-            instance.fmi2Reset(component)
-        self._new = False
-        self._start(instance, values)
+        craft, run, timeline = self._craft, self._plan.run, self._plan.timeline
+        self._start_values.set([values[name] for name in self._start_values.names])
+        craft.enter_initialization(run.start_time, run.stop_time)
+        self._put(timeline.start, values)
+        craft.exit_initialization()
         rows = iter(self._rows)
+        read, step = self._read.get_into, craft.step
         if timeline.start_kept:
-            instance.fmi2GetReal(component, self._read_references, read, next(rows))
-        # fmpy's methods look the function up and its result over, in Python: here that would cost what the step costs
-        do_step, get_real, references = instance.dll.fmi2DoStep, instance.dll.fmi2GetReal, self._read_references
+            read(next(rows))
         controls = None
         for time, end, wanted, kept in self._merged(settings_of(values)):
             if wanted is not controls and wanted != controls:
                 self._put(wanted, values)
             controls = wanted
-            if (status := do_step(component, time, end - time, 1)) > fmi2.fmi2Warning:
-                raise FMICallException("fmi2DoStep", status)
-            if kept and (status := get_real(component, references, read, next(rows))) > fmi2.fmi2Warning:
-                raise FMICallException("fmi2GetReal", status)
-        instance.fmi2GetInteger(component, self._warned_reference, 1, self._warned)
-
-    def _start(self, instance: Any, values: Mapping[str, float | int]) -> None:
-        run = self._plan.run
-        instance.setupExperiment(startTime=run.start_time, stopTime=run.stop_time)
-        if self._real_names:
-            self._reals[:] = [values[name] for name in self._real_names]
-            instance.fmi2SetReal(instance.component, self._real_references, len(self._reals), self._reals)
-        if self._integer_names:
-            self._integers[:] = [values[name] for name in self._integer_names]
-            instance.fmi2SetInteger(instance.component, self._integer_references, len(self._integers), self._integers)
-        instance.enterInitializationMode()
-        self._put(self._plan.timeline.start, values)
-        instance.exitInitializationMode()
+            step(time, end - time)
+            if kept:
+                read(next(rows))
 
     def _put(self, controls: Controls, values: Mapping[str, float | int]) -> None:
-        self._inputs[:] = controls
+        given = list(controls)
         for i, name in self._driven:
-            self._inputs[i] = values[name]
-        self._instance.fmi2SetReal(self._instance.component, self._input_references, len(INPUTS), self._inputs)
+            given[i] = values[name]
+        self._inputs.set(given)
 
 
 @contextmanager

@@ -212,11 +212,7 @@ def _check_batch(study: Study) -> None:
 
 def _content(study: Study, path: Path) -> bytes:
     """The FMU as it is now, checked."""
-    if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes it")
-    has = {
-        variable.name for variable in read_description(path, model=HOVERCRAFT.name, versions=("2.0",)).modelVariables
-    }
+    has = {variable.name for variable in read_description(path, model=HOVERCRAFT.name).modelVariables}
     for name in (*study.run.start_values, *(factor.name for factor in study.factors), *study.keep.read, *SETTINGS):
         if name not in has:
             raise ValueError(f"{path}: must have the variable {name}")

@@ -141,6 +141,7 @@ class Flight:
         self._record, self._recorded = record, recorded
         self._log: ControlLog | None = None
         self._recorded_once = False
+        self._states, self._speed = stepper.port(*STATES), stepper.port("speed")
         self.operator = self._new_operator()
         stepper.start(self.operator.controls)
 
@@ -161,12 +162,12 @@ class Flight:
     @property
     def state(self) -> State:
         """As the FMU gives it."""
-        return State(*self._stepper.read(*STATES))
+        return State(*self._states.get())
 
     @property
     def speed(self) -> float:
         """m/s."""
-        return self._stepper.read("speed")[0]
+        return self._speed.get()[0]
 
     @property
     def warnings(self) -> list[str]:

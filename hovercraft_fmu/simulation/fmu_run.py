@@ -1,0 +1,127 @@
+"""A run on an FMU: through fmpy's master, or step by step."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import isclose
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+
+from ..fmu.interface import HOVERCRAFT, INPUTS
+from ..fmu.python_package import build_fmu
+from ..host import Fmu, Instance, SimulationError
+from ..model.dynamics import Controls
+from .planning import Inputs, Progress, Run, plan
+from .result import Result
+
+DEFAULT_FMU = Path("build") / f"{HOVERCRAFT.name}.fmu"
+
+
+def simulate(
+    scene_or_inputs: Inputs = "launch",
+    fmu: str | os.PathLike[str] | None = None,
+    *,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Result:
+    """Run a scene, or inputs of your own, on the FMU.
+
+    Args:
+        scene_or_inputs: see `Inputs`.
+        fmu: the file; without it build/Hovercraft.fmu under the current folder, which is built if it is not there.
+        progress: see `Progress`.
+        options: see `plan`: preset, start_values, start_time, stop_time, communication_step.
+
+    Raises:
+        ValueError: an input, a name or a value that cannot be; FileNotFoundError: no such file.
+        SimulationError: the FMU refused a value or a step, with its message; or the run ended early.
+    """
+    run = plan(scene_or_inputs, **options)
+    return run_fmu(run, default_fmu() if fmu is None else fmu, progress)
+
+
+def default_fmu() -> Path:
+    """build/Hovercraft.fmu under the current folder, which is built if it is not there."""
+    return DEFAULT_FMU if DEFAULT_FMU.exists() else build_fmu(DEFAULT_FMU)
+
+
+def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = None) -> Result:
+    """Run on an FMU, through fmpy, with its logging on. Raises as `simulate` does."""
+
+    def step_finished(time: float, _recorder: object) -> bool:
+        if progress:
+            progress(time)
+        return True
+
+    with Fmu(fmu, HOVERCRAFT.name) as opened, opened.instance() as craft, craft.driven_by_fmpy():
+        shown = [v.name for v in opened.description.modelVariables if v.causality in ("input", "output", "local")]
+        data = fmpy.simulate_fmu(
+            opened.folder,
+            model_description=opened.description,
+            fmu_instance=craft.fmpy,
+            start_time=run.start_time,
+            stop_time=run.stop_time,
+            output_interval=run.communication_step,
+            start_values=dict(run.start_values),
+            input=run.signals,
+            output=shown,
+            step_finished=step_finished,
+        )
+    if not isclose(data["time"][-1], run.stop_time):
+        raise SimulationError(f"the run ended at {data['time'][-1]!r} s: must reach stop_time = {run.stop_time!r} s")
+    return Result(np.asarray(data), run, tuple(craft.messages))
+
+
+class Stepper:
+    """An FMU that is taken from one communication point to the next by hand, with the calls of fmpy's master.
+
+    So `run_fmu` over the same controls, a row a communication point, comes to the same bits. It raises
+    SimulationError where the FMU refuses a call.
+    """
+
+    def __init__(self, craft: Instance, run: Run) -> None:
+        self.messages = craft.messages
+        """What the FMU has said since it was started."""
+        self.port = craft.port
+        """Of the FMU, to read from: see `Instance.port`."""
+        self._craft, self._run, self._inputs = craft, run, craft.port(*INPUTS)
+        self._steps = 0
+
+    @property
+    def time(self) -> float:
+        """s: the communication point reached."""
+        return self._point(self._steps)
+
+    def _point(self, n: int) -> float:
+        return self._run.start_time + n * self._run.communication_step
+
+    def start(self, controls: Controls) -> None:
+        """Initialize it, at the start time."""
+        self._craft.set(self._run.start_values)
+        self._craft.enter_initialization(self._run.start_time)
+        self._inputs.set(controls)
+        self._craft.exit_initialization()
+
+    def restart(self, controls: Controls) -> None:
+        """Back to the start."""
+        self._craft.reset()
+        self._steps = 0
+        self.messages.clear()
+        self.start(controls)
+
+    def step(self, controls: Controls) -> None:
+        """One communication step, with the controls held."""
+        time = self.time
+        self._inputs.set(controls)
+        self._craft.step(time, self._point(self._steps + 1) - time)
+        self._steps += 1
+
+
+@contextmanager
+def stepping(run: Run, fmu: str | os.PathLike[str]) -> Iterator[Stepper]:
+    """An FMU to step by hand, not yet started. Raises as `simulate` does."""
+    with Fmu(fmu, HOVERCRAFT.name) as opened, opened.instance() as craft:
+        yield Stepper(craft, run)

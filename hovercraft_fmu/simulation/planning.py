@@ -1,0 +1,203 @@
+"""What a run needs, checked and completed: inputs, start values, times."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+
+from ..fmu.interface import BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
+from ..fmu.variable import Enumeration
+from ..model.craft import Craft, preset
+from ..model.dynamics import State
+from ..model.integrators import integrator
+from ..model.subcycling import Settings
+from ..scenes import Scene, Signals, scene, signals
+from .control_log import checked_signals, read_inputs
+
+Value: TypeAlias = float | int | str
+"""Of a variable; an item of an enumeration may be given by its name."""
+Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
+"""A scene or its name; a CSV file (a name that ends in .csv); a structured array with `time` and input names."""
+Progress: TypeAlias = Callable[[float], None]
+"""Called with the time [s] reached, after every communication step."""
+
+
+def method_in_words(integrator: str, step_size: float, tolerance: float) -> str:
+    """'rk4, 0.1 s'; of the adaptive method it is the tolerance that drives the accuracy."""
+    return f"{integrator}, " + (f"tolerance {tolerance:g}" if integrator == "adaptive" else f"{step_size:g} s")
+
+
+@dataclass(frozen=True)
+class Run:
+    """All that one run needs, checked."""
+
+    title: str
+    signals: Signals
+    start_values: Mapping[str, float | int]
+    start_time: float
+    """s"""
+    stop_time: float
+    """s"""
+    communication_step: float
+    """s"""
+
+    @property
+    def craft(self) -> Craft:
+        """The craft at the start. Raises ValueError where a parameter is impossible."""
+        values: dict[str, Any] = {name: self.value(name) for name in CRAFT_PARAMETERS}
+        return Craft(**values)
+
+    @property
+    def settings(self) -> Settings:
+        """Sub-step and method."""
+        method = integrator(int(self.value("integrator")))
+        return Settings(float(self.value("step_size")), method, float(self.value("tolerance")))
+
+    @property
+    def method(self) -> str:
+        """The method and what drives its accuracy, in words."""
+        settings = self.settings
+        return method_in_words(settings.integrator.name, settings.step_size, settings.tolerance)
+
+    @property
+    def start(self) -> State:
+        """The state at the start."""
+        return State(*(float(self.value(name)) for name in STATES))
+
+    def value(self, name: str) -> float | int:
+        """The start value of a variable."""
+        default = BY_NAME[name].start
+        return self.start_values.get(name, 0.0 if default is None else default)
+
+
+def plan(
+    scene_or_inputs: Inputs = "launch",
+    *,
+    preset: str | None = None,
+    start_values: Mapping[str, Value] | None = None,
+    start_time: float | None = None,
+    stop_time: float | None = None,
+    communication_step: float | None = None,
+) -> Run:
+    """Check and complete what a run needs.
+
+    Args:
+        scene_or_inputs: see `Inputs`.
+        preset: name of a craft; a scene has its own.
+        start_values: of parameters, inputs and states, by their names in the FMU; they come after the preset's.
+        start_time, stop_time: s; by default the first and the last time of the inputs.
+        communication_step: s; by default the scene's, else 0.01 s.
+
+    Raises:
+        ValueError: names the argument, the value and the rule.
+    """
+    chosen = _scene(scene_or_inputs)
+    table = chosen.signals if chosen else _signals(cast("str | os.PathLike[str] | Signals", scene_or_inputs))
+    values = _scene_values(chosen, preset) | _start_values(start_values or {})
+    first, last = float(table["time"][0]), float(table["time"][-1])
+    if len(table) == 1:
+        last = first + HOVERCRAFT.stop_time
+    default_step = chosen.communication_step if chosen else HOVERCRAFT.communication_step
+    run = Run(
+        title=_title(chosen, scene_or_inputs),
+        signals=_completed(table, values),
+        start_values=values,
+        start_time=first if start_time is None else start_time,
+        stop_time=last if stop_time is None else stop_time,
+        communication_step=default_step if communication_step is None else communication_step,
+    )
+    _check_times(run)
+    return run
+
+
+def _scene(scene_or_inputs: Inputs) -> Scene | None:
+    if isinstance(scene_or_inputs, Scene):
+        return scene_or_inputs
+    if isinstance(scene_or_inputs, str) and not scene_or_inputs.endswith(".csv"):
+        return scene(scene_or_inputs)
+    return None
+
+
+def _title(chosen: Scene | None, scene_or_inputs: Inputs) -> str:
+    if chosen:
+        return chosen.name
+    return "inputs" if isinstance(scene_or_inputs, np.ndarray) else Path(cast(str, scene_or_inputs)).name
+
+
+def _signals(source: str | os.PathLike[str] | Signals) -> Signals:
+    if isinstance(source, np.ndarray):
+        return checked_signals(source, "inputs")
+    return read_inputs(source)
+
+
+def _completed(table: Signals, values: Mapping[str, float | int]) -> Signals:
+    """All inputs have a column, so that none is left to chance: what is not given holds its start value."""
+    columns = []
+    for name in INPUTS:
+        given = name in (table.dtype.names or ())
+        columns.append(table[name] if given else np.full(len(table), values.get(name, BY_NAME[name].start)))
+    return signals(zip(table["time"], *columns, strict=True))
+
+
+def _scene_values(chosen: Scene | None, preset_name: str | None) -> dict[str, float | int]:
+    """What a scene and a preset set, by FMU names; only what differs from the FMU's own start values."""
+    craft = preset(preset_name or (chosen.preset if chosen else "textbook"))
+    values: dict[str, float | int] = {name: getattr(craft, name) for name in CRAFT_PARAMETERS}
+    if chosen:
+        values |= chosen.parameters
+        values |= dict(zip(STATES, chosen.start, strict=True))
+    return {name: value for name, value in values.items() if value != BY_NAME[name].start}
+
+
+def _start_values(given: Mapping[str, Value]) -> dict[str, float | int]:
+    values = {name: start_value(name, value) for name, value in given.items()}
+    for name, beside in HOVERCRAFT.choices.items():  # from here on the Enumeration alone says it
+        if beside.name in values:
+            number = int(values.pop(beside.name))
+            HOVERCRAFT.check_choice(name, number)
+            values[name] = HOVERCRAFT.chosen(name, int(values.get(name, BY_NAME[name].start or 0)), number)
+    return values
+
+
+def start_value(name: str, value: Value) -> float | int:
+    """The value as a number of the variable's type; an item of an enumeration may be given by name.
+
+    Raises:
+        ValueError: no such variable, one that cannot be set, or not a number.
+    """
+    variable = BY_NAME.get(name)
+    if variable is None or variable.start is None:
+        settable = ", ".join(each.name for each in BY_NAME.values() if each.start is not None)
+        raise ValueError(f"{name} = {value}: must be a variable that can be set: {settable}")
+    try:
+        if variable.kind == "Real":
+            return float(value)
+        if variable.enumeration and isinstance(value, str) and not value.isdigit():
+            return _item(name, value, variable.enumeration)
+        return int(value)
+    except (TypeError, ValueError) as error:
+        if variable.enumeration and isinstance(value, str):
+            raise
+        raise ValueError(f"{name} = {value!r}: must be a number") from error
+
+
+def _item(name: str, value: str, enumeration: Enumeration) -> int:
+    number = enumeration.number(value)
+    if number is None:
+        raise ValueError(f"{name} = {value!r}: must be one of {', '.join(item for item, _ in enumeration.items)}")
+    return number
+
+
+def _check_times(run: Run) -> None:
+    for name in ("start_time", "stop_time", "communication_step"):
+        value = getattr(run, name)
+        if not isfinite(value):
+            raise ValueError(f"{name} = {value!r} s: must be a finite number")
+    if not run.communication_step > 0.0:
+        raise ValueError(f"communication_step = {run.communication_step!r} s: must be greater than 0")
+    if not run.stop_time > run.start_time:
+        raise ValueError(f"stop_time = {run.stop_time!r} s: must be after start_time = {run.start_time!r} s")
