@@ -13,7 +13,7 @@ from .fmu.native_package import build_native_fmu
 from .fmu.python_package import build_fmu
 from .ssp import build_ssp
 
-Kind: TypeAlias = Literal["native", "native3", "python", "autopilot", "native_loop", "python_loop"]
+Kind: TypeAlias = Literal["native", "native3", "python", "autopilot", "native_loop", "native3_loop", "python_loop"]
 FOLDER = Path("build")
 
 
@@ -61,6 +61,11 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
             "HovercraftNativeLoop.ssp",
             "SSP 1.0: the closed loop of HovercraftNative.fmu and Autopilot.fmu, for co-simulation masters",
             _write_loop("native"),
+        ),
+        "native3_loop": Product(
+            "HovercraftNative3Loop.ssp",
+            "SSP 1.0: the same loop with HovercraftNative3.fmu",
+            _write_loop("native3"),
         ),
         "python_loop": Product(
             "HovercraftLoop.ssp",

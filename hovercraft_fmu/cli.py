@@ -90,7 +90,7 @@ def commands(context: click.Context) -> None:
 def build_command(kinds: tuple[str, ...], output: Path) -> None:
     """Write the FMUs and the SSP files of the closed loop.
 
-    KIND is native, native3, python, autopilot, native_loop or python_loop; without it all are written.
+    KIND is native, native3, python, autopilot, native_loop, native3_loop or python_loop; without it all are written.
     """
     wanted = [product(kind) for kind in kinds] or list(PRODUCTS.values())
     reasons = {each.name: _written(each, output / each.name) for each in wanted}

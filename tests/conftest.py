@@ -94,7 +94,10 @@ def autopilot(built: Built) -> Path:
     return built("Autopilot.fmu", build_autopilot)
 
 
-@pytest.fixture(scope="session", params=["python", "native", "native3"])
+FLAVOURS = ("python", "native", "native3")
+
+
+@pytest.fixture(scope="session", params=FLAVOURS)
 def flavour(request: pytest.FixtureRequest) -> str:
     """All kinds of FMU, one after the other."""
     return str(request.param)
@@ -104,13 +107,6 @@ def flavour(request: pytest.FixtureRequest) -> str:
 def each_fmu(flavour: str, request: pytest.FixtureRequest) -> Path:
     """The FMU of that kind."""
     made: Path = request.getfixturevalue("fmu" if flavour == "python" else f"{flavour}_fmu")
-    return made
-
-
-@pytest.fixture(scope="session", params=["fmu", "native_fmu"])
-def each_fmi_2_fmu(request: pytest.FixtureRequest) -> Path:
-    """Those of FMI 2.0, one after the other."""
-    made: Path = request.getfixturevalue(request.param)
     return made
 
 

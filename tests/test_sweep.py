@@ -70,7 +70,7 @@ def bits(table: pa.Table) -> pa.Table:
 
 
 @pytest.mark.parametrize("scene", ["turn", "slalom", "crosswind", "drift_to_rest"])
-def test_a_run_has_the_bits_of_simulate(scene: str, each_fmi_2_fmu: Path, tmp_path: Path) -> None:
+def test_a_run_has_the_bits_of_simulate(scene: str, each_fmu: Path, tmp_path: Path) -> None:
     """At every communication point, whatever was run on the instance before."""
     study = {
         "scene": scene,
@@ -79,11 +79,11 @@ def test_a_run_has_the_bits_of_simulate(scene: str, each_fmi_2_fmu: Path, tmp_pa
         "sweep": {"mass": [60.0, 170.0], "integrator": [method.name for method in INTEGRATORS]},
         "keep": {"trajectory": {"every": 0.1, "of": list(OBSERVED)}},
     }
-    sweep(study, each_fmi_2_fmu, workers=1, output=tmp_path)
+    sweep(study, each_fmu, workers=1, output=tmp_path)
     paths = load(tmp_path, "trajectories")
     for row in rows(load(tmp_path)):
         settings = {"step_size": 0.01, "mass": row["mass"], "integrator": row["integrator"]}
-        alone = simulate(scene, each_fmi_2_fmu, start_values=settings, stop_time=12.0)
+        alone = simulate(scene, each_fmu, start_values=settings, stop_time=12.0)
         own = paths.filter(pc.equal(paths["run"], row["run"]))
         for name in ("time", *OBSERVED):
             assert np.array_equal(own[name].to_numpy(), alone[name]), (row, name)
@@ -91,12 +91,12 @@ def test_a_run_has_the_bits_of_simulate(scene: str, each_fmi_2_fmu: Path, tmp_pa
 
 @pytest.mark.parametrize("method", [method.name for method in INTEGRATORS])
 @pytest.mark.parametrize("step_size", [0.1, 0.03])
-def test_what_is_kept_changes_no_bit(method: str, step_size: float, each_fmi_2_fmu: Path, tmp_path: Path) -> None:
+def test_what_is_kept_changes_no_bit(method: str, step_size: float, each_fmu: Path, tmp_path: Path) -> None:
     """Where the end alone is kept communication steps are made as one; the end is the same, what is watched and all."""
     changed = but(set={"integrator": method, "step_size": step_size})
     few = {"end": list(OBSERVED)}
-    sweep(but(changed, keep=few), each_fmi_2_fmu, workers=1, output=tmp_path / "few")
-    sweep(but(changed, keep=few | {"distance": True}), each_fmi_2_fmu, workers=1, output=tmp_path / "all")
+    sweep(but(changed, keep=few), each_fmu, workers=1, output=tmp_path / "few")
+    sweep(but(changed, keep=few | {"distance": True}), each_fmu, workers=1, output=tmp_path / "all")
     every = load(tmp_path / "all").drop_columns("distance")
     assert bits(load(tmp_path / "few")).equals(bits(every))
 
@@ -147,8 +147,8 @@ FAILING = but(sweep={"thrust_min": [0.0, 20.0], "velocity.x": [0.0, 1e200, 5.0]}
 """thrust_min above thrust_max; so fast that the drag overflows; and good ones between them."""
 
 
-def test_a_failed_run_is_a_row_with_its_error(each_fmi_2_fmu: Path, tmp_path: Path) -> None:
-    outcome = sweep(FAILING, each_fmi_2_fmu, workers=1, output=tmp_path)
+def test_a_failed_run_is_a_row_with_its_error(each_fmu: Path, tmp_path: Path) -> None:
+    outcome = sweep(FAILING, each_fmu, workers=1, output=tmp_path)
     made = rows(load(tmp_path))
     assert [row["error"] is None for row in made] == [True, False, True, False, False, False]
     assert (outcome.new, outcome.failed) == (6, 4)
@@ -157,14 +157,14 @@ def test_a_failed_run_is_a_row_with_its_error(each_fmi_2_fmu: Path, tmp_path: Pa
     assert made[3]["error"] == "thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"
     assert all(made[i][name] is None for i in (1, 3, 4, 5) for name in ("end.pose.x", "end.speed", "warnings"))
     start = {"integrator": "rk4", "step_size": 0.1, "drag_area": 2, "velocity.x": 5.0}
-    alone = simulate("turn", each_fmi_2_fmu, start_values=start)
+    alone = simulate("turn", each_fmu, start_values=start)
     assert [made[2][f"end.{name}"] for name in ("pose.x", "speed")] == [alone[name][-1] for name in ("pose.x", "speed")]
 
 
-def test_the_order_of_runs_changes_no_bit(each_fmi_2_fmu: Path) -> None:
+def test_the_order_of_runs_changes_no_bit(each_fmu: Path) -> None:
     """On one instance; failed ones are among them."""
     study = read_study(FAILING)
-    job, _ = runner_module._job(study, each_fmi_2_fmu, "fmu")
+    job, _ = runner_module._job(study, each_fmu, "fmu")
     numbers = np.arange(study.runs)
     try:
         made = [
@@ -522,14 +522,14 @@ def test_a_chunk_has_a_bounded_size(engine: str, fmu: Path) -> None:
 
 
 @pytest.mark.once
-def test_the_bits_do_not_depend_on_who_makes_the_runs(each_fmi_2_fmu: Path, tmp_path: Path) -> None:
+def test_the_bits_do_not_depend_on_who_makes_the_runs(each_fmu: Path, tmp_path: Path) -> None:
     """In this process; on two processes of a cluster on loopback, which get the FMU by content: its file is gone."""
     import distributed
 
     study = but(FAILING, keep={"distance": True, "trajectory": {"every": 15.0, "of": ["pose.x"]}})
-    sweep(study, each_fmi_2_fmu, workers=1, output=tmp_path / "here")
+    sweep(study, each_fmu, workers=1, output=tmp_path / "here")
     copy = tmp_path / "copy.fmu"
-    copy.write_bytes(each_fmi_2_fmu.read_bytes())
+    copy.write_bytes(each_fmu.read_bytes())
     cluster = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1"}
     with distributed.LocalCluster(**cluster, dashboard_address="127.0.0.1:0") as there:
         address = there.scheduler_address
@@ -584,11 +584,6 @@ def test_a_scheduler_that_is_not_there(fmu: Path, tmp_path: Path, monkeypatch: p
         sweep(MASSES, fmu, scheduler="tcp://127.0.0.1:1", output=tmp_path)
     with pytest.raises(ValueError, match="scheduler = 'nonsense': must be an address as tcp://"):
         sweep(MASSES, fmu, scheduler="nonsense", output=tmp_path)
-
-
-def test_an_fmu_of_fmi_3_is_refused(tmp_path: Path, native3_fmu: Path) -> None:
-    with pytest.raises(ValueError, match=r"HovercraftNative3\.fmu: must be an FMU for co-simulation, FMI 2\.0"):
-        sweep(MASSES, native3_fmu, workers=1, output=tmp_path)
 
 
 def test_an_fmu_of_another_model_is_refused(tmp_path: Path) -> None:

@@ -113,12 +113,12 @@ def run_in(host: str, fmu: Path) -> list[list[float]]:
     Raises:
         HostError: the host failed; the last of what it printed.
     """
-    return run(["single", host, str(fmu.absolute())])
+    return rows_of_module("hovercraft_fmu.hosts", host, str(fmu.absolute()))
 
 
-def run(arguments: list[str], cwd: Path | None = None) -> list[list[float]]:
-    """What `python -m hovercraft_fmu.hosts` prints with these arguments. Raises HostError where that fails."""
-    command = module_command("hovercraft_fmu.hosts", *arguments)
+def rows_of_module(module: str, *arguments: str, cwd: Path | None = None) -> list[list[float]]:
+    """What `python -m module` prints last with these arguments, as JSON. Raises HostError where that fails."""
+    command = module_command(module, *arguments)
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, timeout=300)
     if done.returncode != 0:
         raise HostError(f"exit status {done.returncode}: {done.stderr.strip()[-500:]}")

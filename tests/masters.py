@@ -5,19 +5,21 @@ SSP file. A row is what both FMUs show at the end of a communication step: STATE
 autopilot.
 """
 
+import json
 import shutil
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from ..autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
-from ..fmu.description import xml
-from ..fmu.interface import HOVERCRAFT, STATES
-from ..fmu.variable import Model
-from ..scenes import VOYAGES
-from ..ssp import CRAFT, PARAMETERS, PILOT, build_ssp
-from . import HostError, load_tbb, make_container, run
+from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
+from hovercraft_fmu.fmu.description import xml
+from hovercraft_fmu.fmu.interface import HOVERCRAFT, STATES
+from hovercraft_fmu.fmu.variable import Model
+from hovercraft_fmu.hosts import HostError, load_tbb, make_container, rows_of_module
+from hovercraft_fmu.scenes import VOYAGES
+from hovercraft_fmu.ssp import CRAFT, PARAMETERS, PILOT, build_ssp
 
 VOYAGE = VOYAGES["crosswind"]
 STEPS = 700
@@ -36,8 +38,7 @@ def loop_in(master: str, craft: Path, autopilot: Path, folder: Path) -> Rows:
         HostError: the master failed; the last of what it printed.
     """
     fmus = [str(shutil.copy(path, folder)) for path in (craft, autopilot)]
-    rows: Rows = run(["loop", master, *fmus], cwd=folder)
-    return rows
+    return rows_of_module("tests.masters", master, *fmus, cwd=folder)
 
 
 # ---- what runs in the process of its own: in an empty folder, but for the two FMUs
@@ -278,3 +279,7 @@ LOOPS: Mapping[str, Callable[[Path, Path], Rows]] = {
     "fmucontainer, JSON, sequential": fmucontainer_sequential,
     "fmpy.ssp": fmpy_ssp,
 }
+
+if __name__ == "__main__":
+    name, *files = sys.argv[1:]
+    print("\n" + json.dumps(LOOPS[name](*map(Path, files))))
