@@ -73,9 +73,9 @@ def test_memory_of_numpys_is_read_into(craft: Instance) -> None:
     states.get_into(row)
     assert record.tolist() == [[0.0, 0.0], [3.0, -1.0]]
     for wrong in (np.zeros(3), np.zeros(2, np.float32)):
-        with pytest.raises(ValueError, match=r"must have 2 values of the one type of pose\.x, velocity\.x"):
+        with pytest.raises(ValueError, match=r"must have 2 values of the type of pose\.x, velocity\.x"):
             states.over(wrong)
-    with pytest.raises(ValueError, match=r"must have 2 values of the one type of pose\.x, substeps"):
+    with pytest.raises(ValueError, match=r"pose\.x, substeps: must be of one type"):
         craft.port("pose.x", "substeps").over(record[1])
 
 

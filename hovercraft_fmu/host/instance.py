@@ -1,6 +1,6 @@
 """The class that drives an instance of an FMU, of FMI 2.0 or 3.0, for co-simulation or model exchange."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import byref, c_bool, c_double, c_int
 from functools import cached_property
@@ -226,6 +226,38 @@ class Instance:
         if status > WARNING:
             self.check(status)
 
+    def follow(
+        self,
+        legs: Iterable[tuple[float, float, Any, bool]],
+        put: Callable[[Any], None],
+        seen: "Port",
+        rows: Iterable[Any],
+    ) -> None:
+        """Many steps: beside the FMU's own code they cost what their calls through ctypes cost.
+
+        Args:
+            legs: start [s], end [s], inputs, whether `seen` is read at the end.
+            put: sets inputs; it is called where they change.
+            seen: variables of one type.
+            rows: where what is read goes, one after the other; see `Port.over`.
+        """
+        is_fmi_3, component, do_step = self.is_fmi_3, self.component, self._do_step
+        get, references, count = seen.call
+        row, held = iter(rows), None
+        for time, end, wanted, kept in legs:
+            if wanted is not held and wanted != held:
+                put(wanted)
+            held = wanted
+            if is_fmi_3:
+                self.step(time, end - time)
+                if kept:
+                    seen.get_into(next(row))
+                continue
+            if (status := do_step(component, time, end - time, 1)) > WARNING:
+                self.check(status)
+            if kept and (status := get(component, references, count, next(row))) > WARNING:
+                self.check(status)
+
     def reset(self) -> None:
         """Back to what it was when it was made. After a fatal error the standards allow no call: it is made anew."""
         if self._fatal:
@@ -341,18 +373,29 @@ class Port:
         Raises:
             ValueError: not of that type, or not as many.
         """
-        if len(self._groups) != 1 or row.shape != (len(self.names),) or row.dtype != self._groups[0].type:
-            raise ValueError(f"row: must have {len(self.names)} values of the one type of {', '.join(self.names)}")
-        return (self._groups[0].type * len(self.names)).from_buffer(row)
+        wanted = self._one_type().type
+        if row.shape != (len(self.names),) or row.dtype != wanted:
+            raise ValueError(f"row: must have {len(self.names)} values of the type of {', '.join(self.names)}")
+        return (wanted * len(self.names)).from_buffer(row)
 
     def get_into(self, row: Any) -> None:
         """Read all, into what `over` made."""
-        self._groups[0].get(row)
+        self._one_type().get(row)
+
+    @property
+    def call(self) -> tuple[Any, Any, int]:
+        """Of variables of one type: the function that reads them, and its arguments before the row."""
+        group = self._one_type()
+        return group.get_function, group.references, group.count
+
+    def _one_type(self) -> "_Group":
+        if len(self._groups) != 1:
+            raise ValueError(f"{', '.join(self.names)}: must be of one type")
+        return self._groups[0]
 
     def set_slopes(self, slopes: Sequence[float]) -> None:
         """1/s: how the inputs change over the next step. FMI 2.0."""
-        (group,) = self._groups
-        group.set_slopes(slopes)
+        self._one_type().set_slopes(slopes)
 
 
 class _Group:
@@ -365,7 +408,7 @@ class _Group:
         self.type = getattr(fmi3, f"fmi3{name}") if self._is_fmi_3 else getattr(fmi2, f"fmi2{name}")
         self.references = (fmi2.fmi2ValueReference * self.count)(*(variables[i].valueReference for i in places))
         self.values = (self.type * self.count)()
-        self._set, self._get = instance.function(f"Set{name}"), instance.function(f"Get{name}")
+        self._set, self.get_function = instance.function(f"Set{name}"), instance.function(f"Get{name}")
 
     def set(self, values: Any) -> None:
         instance = self._instance
@@ -390,9 +433,9 @@ class _Group:
     def get(self, values: Any) -> None:
         instance = self._instance
         if self._is_fmi_3:
-            status = self._get(instance.component, self.references, self.count, values, self.count)
+            status = self.get_function(instance.component, self.references, self.count, values, self.count)
         else:
-            status = self._get(instance.component, self.references, self.count, values)
+            status = self.get_function(instance.component, self.references, self.count, values)
         if status > WARNING:
             instance.check(status)
 

@@ -120,17 +120,9 @@ class Driver:
         self._put(timeline.start, values)
         craft.exit_initialization()
         rows = iter(self._rows)
-        read, step = self._read.get_into, craft.step
         if timeline.start_kept:
-            read(next(rows))
-        controls = None
-        for time, end, wanted, kept in self._merged(settings_of(values)):
-            if wanted is not controls and wanted != controls:
-                self._put(wanted, values)
-            controls = wanted
-            step(time, end - time)
-            if kept:
-                read(next(rows))
+            self._read.get_into(next(rows))
+        craft.follow(self._merged(settings_of(values)), lambda wanted: self._put(wanted, values), self._read, rows)
 
     def _put(self, controls: Controls, values: Mapping[str, float | int]) -> None:
         given = list(controls)
