@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.console import Console, Group
+from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -271,32 +271,6 @@ def _demo_of_the_loop(fmu: Path, autopilot: Path) -> None:
     OUTPUT.print(f"wrote {plot_passage(passage, DEMO_FOLDER / 'loop.png')}")
 
 
-@commands.command()
-def benchmark() -> None:
-    """Measure what a step costs: reference loop, bare model, FMU through fmpy; side by side, as ratios."""
-    from .studies.benchmark import measure
-
-    OUTPUT.print(measure())
-
-
-@commands.command()
-@click.option("--quick", is_flag=True, help="One scene, one repeat: half a minute instead of minutes.")
-@click.option(
-    "--output", type=click.Path(path_type=Path), metavar="DIR", default=Path("build") / "trade", show_default=True
-)
-def trade(quick: bool, output: Path) -> None:
-    """Measure what speed costs and what accuracy costs: methods, steps, communication steps, over the scenes.
-
-    And what a solver of the host's costs beside the methods of the native FMU.
-    """
-    from .studies import model_exchange, step_costs
-    from .studies import trade as work
-
-    _measure(lambda folder, tell: work.run(folder, quick, tell), output)
-    OUTPUT.print(model_exchange.run(output, quick))
-    OUTPUT.print(step_costs.run(output))
-
-
 MEASURE = """Measure the product: what speed costs, what accuracy costs, where the methods break.
 
 NAME is one of the studies; what each takes is on a machine with nothing else to do:
@@ -326,10 +300,7 @@ def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 
 @click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
 @click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Default: build/sweep/ and the study.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the results.")
-@click.option("--benchmark", is_flag=True, help="Measure what a run costs, beside fmpy's own way, and stop (minutes).")
-def sweep_command(
-    study: str | None, fmu: Path | None, output: Path | None, plot: Path | None, benchmark: bool, **options: Any
-) -> None:
+def sweep_command(study: str | None, fmu: Path | None, output: Path | None, plot: Path | None, **options: Any) -> None:
     """Make many runs of one FMU, in parallel, into Parquet files.
 
     STUDY is a TOML file, or the name of a study of the package: turning_circle. FMU is the file; without it
@@ -338,10 +309,6 @@ def sweep_command(
     """
     from .sweep import read_study, sweep
 
-    if benchmark:
-        from .studies.sweep_costs import run
-
-        return _measure(run, output or Path("build") / "sweep_benchmark")
     if study is None:
         raise click.UsageError("STUDY: must be given")
     chosen = read_study(study)
@@ -363,7 +330,7 @@ def sweep_command(
         from .sweep.plots import plot_sweep
 
         OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
-    return None
+    return
 
 
 @commands.command("cross-check")
@@ -421,13 +388,6 @@ def _tell_lines(doing: str, task: Task, ended: Event) -> None:
     begun = perf_counter()
     while not ended.wait(LINE_EVERY):
         click.echo(f"{doing}: {task.percentage:.0f} %, {perf_counter() - begun:.0f} s", err=True)
-
-
-def _measure(study: Callable[[Path, Callable[[float], None]], Group], output: Path) -> None:
-    """Make a study under a progress bar, and print its report."""
-    with _progress(1.0, "measuring") as tell:
-        report = study(output, tell)
-    OUTPUT.print(report)
 
 
 def _simulated(inputs: Inputs, fmu: Path | None, **options: Any) -> Result:

@@ -1,5 +1,6 @@
 """The command as its user meets it, in an empty folder; as a program of its own it is in test_readme.py."""
 
+import re
 import subprocess
 import sys
 import zipfile
@@ -12,6 +13,7 @@ from rich.table import Table
 
 from hovercraft_fmu.cli import OUTPUT
 from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.studies import STUDIES
 from tests.shell import Shell
 
 
@@ -28,7 +30,7 @@ def test_hints_are_printed_as_they_stand() -> None:
 def test_bare_command_helps(shell: Shell) -> None:
     printed = shell.ok()
     assert "hovercraft-fmu demo" in printed
-    assert all(command in printed for command in ("build", "simulate", "validate", "demo", "benchmark"))
+    assert all(command in printed for command in ("build", "simulate", "validate", "demo", "measure"))
 
 
 def test_demo(shell: Shell) -> None:
@@ -118,6 +120,8 @@ HIDDEN = {
     "matplotlib of an animation": (("simulate", "--stop-time", "1", "--animate", "a.gif"), "[plot]"),
     "plotly": (("simulate", "--stop-time", "1", "--animate", "a.html"), "[html]"),
     "pyarrow": (("sweep", "turning_circle"), "[sweep]"),
+    "polars": (("measure", "coupling"), "[studies]"),
+    "scipy": (("measure", "trade"), "[studies]"),
 }
 """Library, the command that needs it, and the extra that has it."""
 
@@ -135,6 +139,7 @@ def test_what_is_not_installed_is_named(name: str, tmp_path: Path) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_benchmark_prints_its_ratios(shell: Shell) -> None:
-    printed = shell.ok("benchmark")
-    assert all(case in printed for case in ("reference loop, inline", "bare model", "FMU through fmpy"))
+def test_the_studies_are_listed_with_what_they_take(shell: Shell) -> None:
+    printed = shell.ok("measure", "--help")
+    for name, study in STUDIES.items():
+        assert re.search(rf"^ +{name} .*\({study.takes}\)$", printed, re.MULTILINE)

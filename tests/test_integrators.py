@@ -14,7 +14,6 @@ from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator, integrator_number
 from hovercraft_fmu.model.subcycling import Settings, advance, stability_number
 from hovercraft_fmu.scenes import COAST_SPEED, SCENES
-from hovercraft_fmu.studies.benchmark import reference_loop
 from tests.strategies import controls, crafts, numbers, states
 from tests.test_scenes import EXACT, NAMES
 
@@ -182,11 +181,3 @@ def test_rk4_beats_both_first_order_methods() -> None:
     reference = end("rk4", 0.001)
     errors = {name: math.dist(end(name, 0.1)[:2], reference[:2]) for name in ORDERS}
     assert errors["rk4"] < 1e-3 * min(errors["drag_implicit"], errors["semi_implicit_euler"])
-
-
-def test_the_reference_loop_of_the_benchmark_goes_where_the_default_goes() -> None:
-    """What the benchmark compares with are the same equations, as people write them: but for roundings."""
-    asked, craft = Controls(5.0, 0.5, 0.2), Craft()
-    start = State(1.0, -2.0, 0.3, 0.4, -0.1, 0.05)
-    end = advance(start, asked, craft, 5.0).state
-    assert reference_loop(start, asked, craft, 5000) == pytest.approx(end, rel=0.0, abs=1e-12)

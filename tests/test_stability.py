@@ -18,10 +18,10 @@ from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES, STEP_TURNS, STEP_UNSTABLE
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
-from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator_number
+from hovercraft_fmu.model.integrators import INTEGRATORS, MIN_STEP, StepTooSmallError, integrator_number
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, stability_number
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.studies.batches import FIXED, Batch, chosen, single
+from hovercraft_fmu.studies.batches import ADAPTIVE, FIXED, Batch, chosen, single
 from hovercraft_fmu.studies.extremes import (
     ACCURATE,
     FAILED,
@@ -37,7 +37,7 @@ from hovercraft_fmu.studies.extremes import (
     sample,
     shares,
 )
-from hovercraft_fmu.studies.stability import QUALITIES, Motion, largest_first_step, largest_step, motions, theory
+from hovercraft_fmu.studies.stability import QUALITIES, Motion, largest_step, motions, theory
 from tests.lowlevel import another, count, get, one, reference
 from tests.test_trade import RESULTS, records
 
@@ -130,19 +130,20 @@ def test_the_bound_falls_with_the_order_of_the_method(method: Any) -> None:
 
 
 @pytest.mark.once
-def test_the_command(tmp_path: Path) -> None:
-    """The whole study; and what is committed is what it writes, but for the last bits of another machine's sines."""
-    done = CliRunner().invoke(commands, ["measure", "stability", "--output", str(tmp_path / "new")])
+def test_the_quick_study_finds_what_is_committed(tmp_path: Path) -> None:
+    """The limits, of two of the craft; shares of 1024 runs scatter by 1.5 %."""
+    done = CliRunner().invoke(commands, ["measure", "stability", "--quick", "--output", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    assert "bound of rk4: 1*(N*lambda*eps^4 + s*sigma*eps^2)*V" in done.output
-    for name in ("stability.csv", "extremes.csv"):
-        rows, committed = records(tmp_path / "new" / name), records(RESULTS / name)
-        assert [row["method"] for row in rows] == [row["method"] for row in committed]
-        for row, other in zip(rows, committed, strict=True):
+    keys = {"stability": ("method", "case", "quality"), "extremes": ("method", "sampling")}
+    for name, columns in keys.items():
+        committed = {tuple(row[key] for key in columns): row for row in records(RESULTS / f"{name}.csv")}
+        for row in records(tmp_path / f"{name}.csv"):
+            before = committed[tuple(row[key] for key in columns)]
             for column in {"smallest", "warned", "accurate", "silent"} & row.keys():
-                assert float(row[column]) == pytest.approx(float(other[column]), rel=5e-3, abs=5e-3)
-    assert all(float(row["silent"]) == 0.0 for row in records(tmp_path / "new" / "extremes.csv"))
-    assert (tmp_path / "new" / "stability.png").read_bytes().startswith(b"\x89PNG")
+                near = 5e-3 if column == "smallest" else 0.05
+                assert float(row[column]) == pytest.approx(float(before[column]), rel=near, abs=near)
+    assert all(float(row["silent"]) == 0.0 for row in records(tmp_path / "extremes.csv"))
+    assert (tmp_path / "stability.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_adaptive_method_meets_its_tolerance_or_says_that_it_cannot() -> None:
@@ -153,11 +154,34 @@ def test_the_adaptive_method_meets_its_tolerance_or_says_that_it_cannot() -> Non
     assert share["wrong"] == 0.0
 
 
-def test_the_adaptive_method_takes_any_first_step() -> None:
-    for motion in motions():
-        for limits in largest_first_step(motion).values():
-            assert len(limits) >= 3
-            assert all(limit == math.inf for limit in limits)
+FIRST_STEPS = (0.02, 0.5, 1.5, 3.0, 30.0, 1e3, 1e6)
+"""Dimensionless."""
+UNITS = 30
+"""Of the motion's own time, that it runs on; a communication point after each."""
+
+
+@pytest.mark.parametrize("motion", motions(), ids=lambda motion: motion.name)
+@pytest.mark.parametrize("x", FIRST_STEPS)
+def test_the_adaptive_method_takes_any_first_step(motion: Motion, x: float) -> None:
+    """Monotone, stable, bounded as the others are asked for: a first step that is too long is cut.
+
+    Left out are craft whose whole time is so short that the smallest step, 1e-12 s, is no small part of it: there the
+    method refuses loudly.
+    """
+    slow = np.flatnonzero(motion.crafts.h > 1e4 * MIN_STEP)
+    assert len(slow) >= 3
+    for i in slow:
+        craft, controls, start, unit, _ = single(motion.crafts, i)
+        scale = motion.speed(start, craft)
+        way = Settings(x * unit, ADAPTIVE, 1e-9 * float(abs(scale)))
+        state, proposed, gaps = State(*(motion.near * value for value in start)), 0.0, [1.0]
+        for _ in range(UNITS):
+            stretch = advance(state, controls, craft, unit, way, proposed=proposed)
+            state, proposed = stretch.state, stretch.proposed
+            gaps.append(float(motion.gap(motion.speed(state, craft) / scale)))
+        slack = 1e-8 * UNITS / abs(motion.near - motion.goal)  # some steps' errors, in units of the gap
+        assert all(new <= old + slack and new >= -slack for old, new in itertools.pairwise(gaps))
+        assert abs(gaps[-1]) < 0.999
 
 
 # ---- the same on the real FMU

@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import csv
 import json
 import math
 import os
@@ -33,7 +34,7 @@ from hovercraft_fmu.model.dynamics import Controls
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator
 from hovercraft_fmu.model.subcycling import Settings, substeps
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.studies import sweep_costs as benchmark
+from hovercraft_fmu.studies import carry_out, sweep_costs
 from hovercraft_fmu.sweep import STUDIES, load, read_study, sweep
 from hovercraft_fmu.sweep import runner as runner_module
 from hovercraft_fmu.sweep.plots import plot_sweep
@@ -691,15 +692,18 @@ def test_without_its_libraries_the_command_says_how_to_get_them(tmp_path: Path) 
 
 
 @pytest.mark.once
-def test_the_benchmark(fmu: Path, native_fmu: Path) -> None:
+def test_the_quick_costs_of_a_run(tmp_path: Path, native_fmu: Path) -> None:
     """Every way is measured; no clock is asserted."""
-    ways = dict.fromkeys(case.way for case in benchmark.CASES)
-    measured = benchmark.measure([benchmark.Case(way, benchmark.END, 1, 8) for way in ways], fmu, native_fmu)
-    assert [benchmark.cells(row)[0] for row in measured] == list(ways)
-    assert len(measured) == 4
-    assert measured[0].to_fmpy == 1.0
-    assert all(row.seconds > 0.0 for row in measured)
-    assert benchmark.short(measured) == measured
+    assert native_fmu.exists()
+    report = carry_out("sweeps", quick=True, folder=tmp_path)
+    rows = list(csv.DictReader((tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["way"] for row in rows] == list(dict.fromkeys(way.way for way in sweep_costs.WAYS))
+    assert float(rows[0]["to_fmpy"]) == 1.0
+    for row in rows:
+        seconds = 1e-3 * float(row["milliseconds_a_run"]) * int(row["runs"])
+        assert seconds == pytest.approx(float(row["seconds"]))
+        assert float(row["peak_memory"]) > 10.0 or not Path("/proc/self/status").exists()
+    assert (tmp_path / "sweep.md").read_text(encoding="utf-8").strip() in report
 
 
 def test_the_readme_shows_what_is_committed() -> None:

@@ -28,62 +28,20 @@ from hovercraft_fmu.model.dynamics import (
     slip_speed,
 )
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator, integrator_number
-from hovercraft_fmu.model.subcycling import Settings, advance, substeps
+from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import plan, schedule
 from hovercraft_fmu.studies.reference_end import reference_end
-from hovercraft_fmu.studies.rows import Setting
 from hovercraft_fmu.studies.scene_terms import SHOWN, TERMS
-from hovercraft_fmu.studies.trade import end_error
+from hovercraft_fmu.studies.work_precision import Setting, end_error
 from tests.conftest import ROOT
 from tests.strategies import calm_controls, calm_crafts, controls, numbers, states
 from tests.test_trade import RESULTS, records
 
 NONE = Controls(0.0, 0.0, 0.0)
 EVERY = pytest.mark.parametrize("method", INTEGRATORS, ids=lambda each: each.name)
-PLAIN = [each for each in SCENES.values() if each.craft.plain_drag and not each.craft.rubs and len(each.rows[0]) == 4]
 
 
 # ---- off: not a bit
-
-
-@pytest.mark.parametrize("scene", PLAIN, ids=lambda each: each.name)
-def test_with_every_term_off_a_scene_has_the_bits_of_the_plain_step(scene: Any) -> None:
-    """Against the default step as the model's page writes it down."""
-    run = plan(scene)
-    ours: Any = run.start
-    theirs: tuple[float, ...] = run.start
-    for time, end, asked in schedule(run):
-        ours = advance(ours, asked, run.craft, end - time, run.settings).state
-        n, h = substeps(end - time, run.settings.step_size)
-        theirs = plain_euler(theirs, asked, run.craft, h, n)
-        assert ours == theirs
-
-
-def plain_euler(state: tuple[float, ...], asked: Controls, craft: Craft, h: float, n: int) -> tuple[float, ...]:
-    x, y, psi, vx, vy, r = state
-    thrust, p, s = min(max(asked.thrust, craft.thrust_min), craft.thrust_max), asked.port, asked.starboard
-    assert (min(max(p, 0.0), 1.0), min(max(s, 0.0), 1.0)) == (p, s)
-    f_s, x_d = craft.steering_force, craft.drag_center_fraction * craft.length
-    k = 0.5 * craft.air_density * ((craft.length + craft.width) / 2.0 * craft.height) * craft.drag_coefficient
-    hm, hi = h / craft.mass, h / craft.inertia
-    km, ki = k * hm, k * x_d * hi
-    dt, ds, dr = thrust * hm, f_s * (p - s) * hm, 0.5 * craft.length * f_s * (p - s) * hi
-    for _ in range(n):
-        cos, sin = math.cos(psi), math.sin(psi)
-        u = cos * vx + sin * vy
-        w = (cos * vy - sin * vx) + r * x_d
-        q = math.sqrt(u * u + w * w)
-        fx, fy = dt - km * u * q, ds - km * w * q
-        r = r + (dr - ki * w * q)
-        vx, vy = vx + (cos * fx - sin * fy), vy + (sin * fx + cos * fy)
-        x, y, psi = x + h * vx, y + h * vy, psi + h * r
-    return x, y, psi, vx, vy, r
-
-
-def test_seven_scenes_are_plain() -> None:
-    assert len(PLAIN) == 7
-    assert set(SCENES) - {each.name for each in PLAIN} == {"crosswind", "drift_to_rest"}
 
 
 @given(calm_crafts, states, calm_controls)

@@ -3,27 +3,32 @@
 import csv
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from click.testing import CliRunner
-from rich.console import Console
 
 from hovercraft_fmu.cli import commands
-from hovercraft_fmu.fmu.description import NATIVE
-from hovercraft_fmu.fmu.machine_code import library
+from hovercraft_fmu.hosts import compiler
+from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS
+from hovercraft_fmu.model.subcycling import advance, substeps
 from hovercraft_fmu.scenes import SCENES, Scene
-from hovercraft_fmu.simulation import schedule
-from hovercraft_fmu.studies import model_exchange, step_costs
+from hovercraft_fmu.simulation import plan, schedule
+from hovercraft_fmu.studies import model_exchange
+from hovercraft_fmu.studies.laboratory import Ready, Timed, interleaved, text
 from hovercraft_fmu.studies.reference_end import reference_end
-from hovercraft_fmu.studies.rows import Setting
-from hovercraft_fmu.studies.trade import (
+from hovercraft_fmu.studies.step_costs import OURS, PLAIN, Loops
+from hovercraft_fmu.studies.work_precision import (
     ACCURACIES,
+    Setting,
+    fitted,
     holding_costs,
     observed_orders,
-    planned,
-    timed_bare,
+    reached,
     tolerance_errors,
 )
 from tests.conftest import ROOT
@@ -54,7 +59,7 @@ def test_the_reference_is_sharp_enough_for_every_accuracy_advised(name: str) -> 
 
 
 def test_observed_orders() -> None:
-    orders = {(each.scene, each.integrator): each.slope for each in observed_orders()}
+    orders = {(scene, integrator): slope for scene, integrator, slope in observed_orders().iter_rows()}
     for scene in ("launch", "cycloid"):
         assert orders[scene, "semi_implicit_euler"] == pytest.approx(1.0, abs=0.1)
         assert orders[scene, "drag_implicit"] == pytest.approx(1.0, abs=0.1)
@@ -65,63 +70,133 @@ def test_observed_orders() -> None:
 
 def test_holding_costs_a_first_order() -> None:
     holding = holding_costs()
-    steps, errors = zip(*holding, strict=True)
-    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
+    assert fitted(holding["communication_step"], holding["position_error"]) == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_millimetre_on_turn() -> None:
     """The default meets it; RK4 meets it with a five-hundredth of the sub-steps."""
     exact, _ = reference_end(SCENES["turn"], 60.0)
     for setting, most in ((Setting("semi_implicit_euler", 0.001, 0.5), 60000), (Setting("rk4", 0.5, 0.5), 120)):
-        run = planned(SCENES["turn"], setting)
-        _, end, count = timed_bare(run, list(schedule(run)))
-        assert math.hypot(end.x - exact.x, end.y - exact.y) <= 1e-3
+        end, count = reached(SCENES["turn"], setting)
+        assert math.dist(end[:2], exact[:2]) <= 1e-3
         assert count == most
 
 
 def test_the_error_of_adaptive_follows_its_tolerance_on_every_held_scene() -> None:
     """Over six decades; at most a thousand times the tolerance at the end of a minute of hundreds of steps."""
-    for row in tolerance_errors():
-        assert row.error <= 1e3 * row.tolerance + 1e-9, row
+    for row in tolerance_errors().iter_rows(named=True):
+        assert row["error"] <= 1e3 * row["tolerance"] + 1e-9, row
+
+
+def test_cases_are_run_in_turn_and_the_least_counts() -> None:
+    made: list[str] = []
+
+    def case(name: str) -> Ready[int]:
+        def go() -> int:
+            made.append(name)
+            return len(made)
+
+        return lambda: go
+
+    told: list[float] = []
+    timed = interleaved({name: case(name) for name in "ab"}, 3, told.append)
+    assert "".join(made) == "ababab"
+    assert told == pytest.approx([1 / 6, 2 / 6, 3 / 6, 4 / 6, 5 / 6, 1.0])
+    assert timed["b"].found == 6
+    assert (Timed((3.0, 2.0, 2.5), None).least, Timed((3.0, 2.0, 2.5), None).spread) == (2.0, 0.25)
+
+
+@pytest.fixture(scope="module")
+def loops(tmp_path_factory: pytest.TempPathFactory) -> Loops:
+    if compiler() is None:
+        pytest.skip("no C compiler (cc, gcc, clang)")
+    return Loops(tmp_path_factory.mktemp("loops"))
+
+
+PLAIN_SCENES = [each for each in SCENES.values() if each.craft.plain_drag and not each.craft.rubs
+                and len(each.rows[0]) == 4]  # fmt: skip
+
+
+@pytest.mark.parametrize("scene", PLAIN_SCENES, ids=lambda each: each.name)
+def test_with_every_term_off_a_scene_has_the_bits_of_the_plain_loop(scene: Scene, loops: Loops) -> None:
+    """What speed is compared with is the same arithmetic; and what a scene does not ask for changes no bit."""
+    run = plan(scene)
+    ours = theirs = run.start
+    for time, end, asked in schedule(run):
+        ours = advance(ours, asked, run.craft, end - time, run.settings).state
+        n, h = substeps(end - time, run.settings.step_size)
+        theirs = loops.plain(theirs, asked, run.craft, h, n)
+        assert ours == theirs
+
+
+def test_seven_scenes_are_plain() -> None:
+    assert len(PLAIN_SCENES) == 7
+    assert set(SCENES) - {each.name for each in PLAIN_SCENES} == {"crosswind", "drift_to_rest"}
+
+
+def test_the_plain_loop_has_the_bits_of_the_default_with_thrusters(loops: Loops) -> None:
+    asked, start = Controls(5.0, 0.5, 0.2), State(1.0, -2.0, 0.3, 0.4, -0.1, 0.05)
+    assert loops.plain(start, asked, Craft(), 0.001, 5000) == advance(start, asked, Craft(), 5.0).state
+
+
+def quick(name: str, folder: Path) -> str:
+    done = CliRunner().invoke(commands, ["measure", name, "--quick", "--output", str(folder)])
+    assert done.exit_code == 0, done.output
+    return done.output
 
 
 @pytest.mark.once
-def test_the_command(tmp_path: Path) -> None:
-    done = CliRunner().invoke(commands, ["trade", "--quick", "--output", str(tmp_path)])
-    assert done.exit_code == 0, done.output
+def test_the_quick_trade(tmp_path: Path, native_fmu: Path) -> None:
+    """What is committed was written by the same command, and tells the same of the errors."""
+    assert native_fmu.exists()  # so there is machine code
+    printed = quick("trade", tmp_path)
     rows, advice = records(tmp_path / "work_precision.csv"), records(tmp_path / "advice.csv")
-    assert {row["integrator"] for row in rows} == {"semi_implicit_euler", "drag_implicit", "rk4", "adaptive"}
+    assert {row["integrator"] for row in rows} == {method.name for method in INTEGRATORS}
     assert [float(row["accuracy_m"]) for row in advice] == list(ACCURACIES)
     assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in advice)
-    assert all(float(row["fmu_cost"]) > 0.0 < float(row["bare_cost"]) for row in rows)
-    assert all((tmp_path / name).stat().st_size > 10000 for name in ("work_precision.png", "holding.png"))
-    if not step_costs.missing():
-        costs, before = (records(folder / "native.csv") for folder in (tmp_path, RESULTS))
-        assert [row["what"] for row in costs] == [row["what"] for row in before]
-        assert all(float(row["native"]) > 0.0 < float(row["other"]) for row in costs)
-        assert {f"{method.name}: a sub-step" for method in INTEGRATORS} <= {row["what"] for row in costs}
-        plain = [row["what"] for row in costs if row["compared_with"].startswith("plain C loop")]
-        assert plain == ["semi_implicit_euler: a sub-step", "adaptive: a sub-step"]
-    if not library(NATIVE).missing:
-        chosen, runs, before = (
-            records(folder / name)
-            for folder, name in (
-                (tmp_path, "exchange.csv"),
-                (tmp_path, "exchange_runs.csv"),
-                (RESULTS, "exchange_runs.csv"),
-            )
-        )
-        assert [float(row["accuracy_m"]) for row in chosen] == list(model_exchange.ACCURACIES)
-        assert {row["scene"] for row in before} == {scene.name for scene in model_exchange.SMOOTH}
-        committed_runs = [row for row in before if row["scene"] == "turn"]
-        for ours, committed in zip(runs, committed_runs, strict=True):
-            assert ours["solver"] == committed["solver"]
-            assert float(ours["error"]) <= 2.0 * float(committed["error"]) + 1e-10
-            assert float(ours["cost"]) > 0.0 < float(ours["evaluations"])
-    # what is committed was written by the same command, and tells the same of the errors
-    for ours, committed in zip(advice, records(RESULTS / "advice.csv"), strict=True):
-        assert float(committed["position_error"]) <= float(committed["accuracy_m"])
-        assert ours.keys() == committed.keys()
+    assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in records(RESULTS / "advice.csv"))
+    same = ("scene", "integrator", "step_size", "tolerance", "communication_step")
+    committed = {tuple(row[name] for name in same): row for row in map(numbers, records(RESULTS / "work_precision.csv"))}
+    for row in map(numbers, rows):
+        known = committed[tuple(row[name] for name in same)]
+        assert row["position_error"] == pytest.approx(known["position_error"], rel=1e-3, abs=1e-10)
+    assert (tmp_path / "work_precision.png").stat().st_size > 10000
+    chosen, runs = records(tmp_path / "exchange.csv"), records(tmp_path / "exchange_runs.csv")
+    assert [float(row["accuracy_m"]) for row in chosen] == list(model_exchange.ACCURACIES)
+    before = records(RESULTS / "exchange_runs.csv")
+    assert {row["scene"] for row in before} == {scene.name for scene in model_exchange.SMOOTH}
+    for ours, theirs in zip(runs, [row for row in before if row["scene"] == "turn"], strict=True):
+        assert ours["solver"] == theirs["solver"]
+        assert float(ours["error"]) <= 2.0 * float(theirs["error"]) + 1e-10
+    assert "| accuracy [m]" in printed
+
+
+def numbers(row: dict[str, str]) -> dict[str, Any]:
+    return {name: value if name in ("scene", "integrator") else float(value) for name, value in row.items()}
+
+
+@pytest.mark.once
+def test_the_quick_costs_of_a_step(tmp_path: Path, native_fmu: Path) -> None:
+    assert native_fmu.exists()
+    quick("step-costs", tmp_path)
+    costs = records(tmp_path / "native.csv")
+    assert {f"{method.name}: a sub-step" for method in INTEGRATORS} <= {row["what"] for row in costs}
+    assert OURS not in {row["compared_with"] for row in costs}
+    if compiler():
+        assert [row["what"] for row in costs if row["compared_with"] == PLAIN] == ["semi_implicit_euler: a sub-step"]
+        assert len([row for row in costs if row["what"].startswith("C host: ")]) == 4
+    for row in costs:
+        assert float(row["ratio"]) == pytest.approx(float(row["other"]) / float(row["native"]))
+    # a Python call of a step of a second costs less than the thousand sub-steps of it in Python
+    (second,) = (row for row in costs if row["what"] == "fmpy: set, doStep of 1 s, get")
+    assert float(second["native"]) < float(second["other"])
+
+
+def test_a_table_is_markdown_with_three_digits() -> None:
+    frame = pl.DataFrame({"name": ["a", "b"], "value": [1.23456, None], "count": [100000, 2]})
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in text(frame).splitlines()]
+    assert [lines[0], *lines[2:]] == [["name", "value", "count"], ["a", "1.23", "100000"], ["b", "", "2"]]
+    assert set("".join(lines[1])) == {"-"}
 
 
 @pytest.mark.parametrize("name", ["advice.md", "native.md"])
@@ -130,11 +205,11 @@ def test_the_readme_shows_what_is_committed(name: str) -> None:
 
 
 @pytest.mark.parametrize("scene", model_exchange.SMOOTH, ids=lambda scene: scene.name)
-def test_stretches_are_the_controls_of_the_scene(scene: Scene) -> None:
+def test_ramps_are_the_controls_of_the_scene(scene: Scene) -> None:
     """At any time, and without a gap; outputs are read at least every half second."""
     names = (scene.signals.dtype.names or ())[1:]
     times = np.linspace(0.01, 59.99, 997)
-    parts = list(model_exchange.stretches(scene))
+    parts = list(model_exchange.ramps(scene))
     assert [part.begin for part in parts] == [0.0, *(part.end for part in parts[:-1])]
     for time in times:
         part = next(part for part in parts if part.begin <= time < part.end)
@@ -143,13 +218,3 @@ def test_stretches_are_the_controls_of_the_scene(scene: Scene) -> None:
     points = [point for part in parts for point in part.points()]
     assert 0.0 < min(np.diff([0.0, *points])) <= max(np.diff([0.0, *points])) <= 0.5
     assert points[-1] == 60.0
-
-
-def test_what_the_native_fmu_costs_is_said_where_it_cannot_be_measured(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(step_costs, "compiler", lambda: None)
-    shown = Console(record=True)
-    shown.print(step_costs.run(tmp_path))
-    assert "not measured: no C compiler" in shown.export_text()
-    assert list(tmp_path.iterdir()) == []

@@ -43,18 +43,15 @@ def carry_out(name: str, quick: bool, folder: Path, tell: Callable[[float], None
     """
     if name not in STUDIES:
         raise ValueError(f"study = {name!r}: must be one of {', '.join(STUDIES)}")
-    for each in NEEDED:
-        _demand(each)
-    findings = importlib.import_module(f".{STUDIES[name].module}", __name__).study(quick, tell)
+    try:
+        module = importlib.import_module(f".{STUDIES[name].module}", __name__)
+    except ModuleNotFoundError as error:
+        if not (error.name or "").startswith(NEEDED):
+            raise
+        raise ModuleNotFoundError(
+            f"studies need {error.name}, which is not installed: pip install 'hovercraft-fmu[studies]'"
+        ) from error
+    findings = module.study(quick, tell)
     findings.write(folder)
     report: str = findings.report()
     return report
-
-
-def _demand(package: str) -> None:
-    try:
-        importlib.import_module(package)
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            f"studies need {package}, which is not installed: pip install 'hovercraft-fmu[studies]'"
-        ) from error

@@ -1,11 +1,12 @@
 """What the communication step of the closed loop costs in accuracy, beside what the integrator costs."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 from ..autopilot.guidance import Pilot, Waypoint, helm, line_of_sight, wanted_force
 from ..coupling import GAUSS_SEIDEL, JACOBI, SCHEMES, BareAutopilot, BareCraft, sail_bare
@@ -15,8 +16,8 @@ from ..model.subcycling import Settings
 from ..scenes import VOYAGES
 from ..view.palette import INK, METHODS, OTHER, QUIET
 from ..view.plots import new_figure
-from .laboratory import Findings, Shown, Tell, part, table
-from .reference_end import TOLERANCES, scipy_module
+from .laboratory import Findings, Shown, Tell, part
+from .reference_end import TOLERANCES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,29 +42,6 @@ Path2 = NDArray[np.float64]
 """Positions [m] every EVERY s, shape (n, 2)."""
 
 
-class LoopError(NamedTuple):
-    """A stretch of the voyage."""
-
-    error_of: str
-    """A scheme, or an integrator with its sub-step"""
-    communication_step: float
-    """s"""
-    position_error: float
-    """m, the largest"""
-
-
-class CourseMade(NamedTuple):
-    """The whole course."""
-
-    scheme: str
-    communication_step: float
-    """s"""
-    arrived: str
-    """with its unit, or 'never'"""
-    cross_track_error: float
-    """m: its root mean square"""
-
-
 def continuous() -> tuple[Path2, float]:
     """The loop without any communication step, and how far it may be off: the difference between two tolerances [m]."""
     fine, coarse = (_solved(tolerance) for tolerance in TOLERANCES)
@@ -83,9 +61,8 @@ def _solved(tolerance: float) -> Path2:
         return [*derivatives(motion, controls, craft.craft), *push]
 
     times = np.arange(0.0, STRETCH + EVERY / 2, EVERY)
-    solve = scipy_module("integrate").solve_ivp
     start = [*craft.state, 0.0, 0.0]
-    made = solve(rates, (0.0, STRETCH), start, "DOP853", t_eval=times, rtol=tolerance, atol=tolerance, max_step=0.5)
+    made = solve_ivp(rates, (0.0, STRETCH), start, "DOP853", t_eval=times, rtol=tolerance, atol=tolerance, max_step=0.5)
     return np.asarray(made.y[:2].T)
 
 
@@ -102,30 +79,30 @@ def _apart(a: Path2, b: Path2) -> float:
     return float(np.hypot(*(a - b).T).max())
 
 
-def errors(steps: Sequence[float], exact: Path2, tell: Tell) -> list[LoopError]:
-    """Both schemes against the continuous loop; each integrator against EXACT, in the Jacobi loop."""
+def errors(steps: Sequence[float], exact: Path2, tell: Tell) -> pl.DataFrame:
+    """The largest [m]: both schemes against the continuous loop; integrators against EXACT, in the Jacobi loop."""
     rows = []
     for done, step in enumerate(steps, 1):
         paths = {scheme: sampled(scheme, step) for scheme in SCHEMES}
-        rows += [LoopError(scheme, step, _apart(path, exact)) for scheme, path in paths.items()]
+        rows += [(scheme, step, _apart(path, exact)) for scheme, path in paths.items()]
         for name, settings in INTEGRATORS.items():
             if settings.step_size <= step:  # else it is the sub-step of EXACT, or another's
-                rows.append(LoopError(name, step, _apart(sampled(JACOBI, step, settings), paths[JACOBI])))
+                rows.append((name, step, _apart(sampled(JACOBI, step, settings), paths[JACOBI])))
         tell(done / len(steps))
-    return rows
+    return pl.DataFrame(rows, ("error_of", "communication_step", "position_error"), orient="row")
 
 
-def courses(steps: Sequence[float], tell: Tell) -> list[CourseMade]:
-    """Whether the craft still reaches every waypoint, and how well it holds the legs."""
+def courses(steps: Sequence[float], tell: Tell) -> pl.DataFrame:
+    """Whether the craft still reaches every waypoint, and how well it holds the legs [m, root mean square]."""
     rows = []
     for done, step in enumerate(steps, 1):
         for scheme in SCHEMES:
             passage = sail_bare(VOYAGE, scheme=scheme, communication_step=step, settings=EXACT)
             arrived = f"{passage['time'][-1]:g} s" if passage.arrived else "never"
             off = float(np.sqrt(np.mean(passage["cross_track_error"] ** 2)))
-            rows.append(CourseMade(scheme, step, arrived, off))
+            rows.append((scheme, step, arrived, off))
         tell(done / len(steps))
-    return rows
+    return pl.DataFrame(rows, ("scheme", "communication_step", "arrived", "cross_track_error"), orient="row")
 
 
 def order(found: pl.DataFrame, error_of: str) -> float:
@@ -138,8 +115,8 @@ def study(quick: bool, tell: Tell) -> Findings:
     """The errors of a stretch and the whole course; quick: fewer communication steps."""
     exact, off = continuous()
     steps, whole = (STEPS[3:], WHOLE_STEPS[2:5]) if quick else (STEPS, WHOLE_STEPS)
-    found = table(errors(steps, exact, part(tell, 0.0, 0.7)))
-    course = table(courses(whole, part(tell, 0.7, 1.0)))
+    found = errors(steps, exact, part(tell, 0.0, 0.7))
+    course = courses(whole, part(tell, 0.7, 1.0))
     half = {error_of: error for error_of, step, error in found.iter_rows() if step == VOYAGE.communication_step}
     schemes = ", ".join(f"{scheme} {order(found, scheme):.2f}" for scheme in SCHEMES)
     wide = found.pivot("error_of", index="communication_step", values="position_error")

@@ -73,30 +73,20 @@ def sample(rng: np.random.Generator, count: int, substeps: int, sampling: str) -
 
     limit = spread(1e-3, 1e9)
     craft = Craft(
-        mass=_logarithmic(rng, 1e-3, 1e6, count),
-        inertia=_logarithmic(rng, 1e-3, 1e6, count),
-        length=_logarithmic(rng, 0.1, 100.0, count),
-        air_density=spread(1e-6, 1e3),
-        drag_center_fraction=-0.5 * command(0.05),
-        steering_force=spread(1e-3, 1e9),
-        thrust_min=-limit,
-        thrust_max=limit,
-    )
+        mass=_logarithmic(rng, 1e-3, 1e6, count), inertia=_logarithmic(rng, 1e-3, 1e6, count),
+        length=_logarithmic(rng, 0.1, 100.0, count), air_density=spread(1e-6, 1e3),
+        drag_center_fraction=-0.5 * command(0.05), steering_force=spread(1e-3, 1e9),
+        thrust_min=-limit, thrust_max=limit,
+    )  # fmt: skip
     controls = Controls(limit * (2.0 * command(0.1) - 1.0), command(0.4), command(0.4))
     speed, course = spread(1e-6, 1e6), np.pi * (2.0 * command(0.0) - 1.0)
     start = State(
-        heading=10.0 * (2.0 * command(0.0) - 1.0),
-        vx=speed * np.cos(course),
-        vy=speed * np.sin(course),
+        heading=10.0 * (2.0 * command(0.0) - 1.0), vx=speed * np.cos(course), vy=speed * np.sin(course),
         yaw_rate=spread(1e-6, 1e4) * rng.choice([-1.0, 1.0], count),
-    )
+    )  # fmt: skip
     if sampling == WITH_TERMS:
-        craft = replace(
-            craft,
-            drag_area=cast(Any, rng.integers(1, 3, count)),
-            rotational_drag=command(0.4),
-            skirt_friction=spread(1e-6, 10.0, 0.4),
-        )
+        areas, spins, friction = rng.integers(1, 3, count), command(0.4), spread(1e-6, 10.0, 0.4)
+        craft = replace(craft, drag_area=cast(Any, areas), rotational_drag=spins, skirt_friction=friction)
         blows, from_where = spread(1e-6, 1e6, 0.4), 2.0 * np.pi * command(0.0)
         controls = controls._replace(wind_x=blows * np.cos(from_where), wind_y=blows * np.sin(from_where))
     runs = made(craft, controls, start, np.ones(count), substeps)
@@ -204,29 +194,8 @@ def _aspect(runs: Batch) -> Array:
     return np.where(runs.craft.drag_area == DIRECTIONAL, np.fmax(walls, 1.0 / walls), 1.0)
 
 
-class Formula(NamedTuple):
-    """The bound of the error at the end of a run."""
-
-    text: str
-    bound: Callable[[Numbers, Batch], Array]
-    """-> of V, with the constant 1"""
-    constant: float = 1.0
-
-
-FIRST_ORDER = Formula(
-    "N*delta*(delta + alpha + phi)*V, delta = s*sigma + rho + tau; with friction (2*phi + 8*rho)*V more",
-    first_order_bound,
-)
-FORMULAS: Mapping[str, Formula] = MappingProxyType(
-    {
-        "semi_implicit_euler": FIRST_ORDER,
-        "drag_implicit": FIRST_ORDER,
-        "rk4": Formula(
-            "(N*lambda*eps^4 + s*sigma*eps^2)*V, lambda = s*sigma + rho + sqrt(tau), eps = lambda + alpha + phi; "
-            "directional: s*sigma*eps*V more; with friction the first order's more",
-            rk4_bound,
-        ),
-    }
+BOUNDS: Mapping[str, Callable[[Numbers, Batch], Array]] = MappingProxyType(
+    {"semi_implicit_euler": first_order_bound, "drag_implicit": first_order_bound, "rk4": rk4_bound}
 )
 
 
@@ -264,8 +233,7 @@ def judge(runs: Batch, methods: Iterable[Integrator] = FIXED) -> dict[str, Judge
             for apart in (_difference(ends, reference, some.craft), doubt)
         )
         with np.errstate(all="ignore"):
-            formula = FORMULAS[method.name]
-            bound = formula.constant * formula.bound(numbers, runs) + ROUNDING
+            bound = BOUNDS[method.name](numbers, runs) + ROUNDING
             accurate = (error <= bound) | (numbers.sigma > NO_REFERENCE)
         verdict = np.select([~numbers.finite, ~calm[method], accurate], [FAILED, WARNED, ACCURATE], SILENT)
         judged[method.name] = Judged(numbers, error, bound, unsure, verdict.astype(np.int8))

@@ -6,7 +6,7 @@ so a page takes it as it is. (pandas would want two packages more for that.)
 
 import platform
 import statistics
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -136,11 +136,6 @@ class Findings:
         return "\n\n".join([*parts, *self.notes, machine()])
 
 
-def table(rows: Sequence[Any]) -> pl.DataFrame:
-    """Rows that are named tuples of one kind, as a table with their names."""
-    return pl.DataFrame(rows, infer_schema_length=None)
-
-
 def text(frame: pl.DataFrame) -> str:
     """A table in Markdown; numbers with three digits."""
     cells = {name: [_cell(value) for value in frame[name]] for name in frame.columns}
@@ -150,4 +145,6 @@ def text(frame: pl.DataFrame) -> str:
 
 
 def _cell(value: Any) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else "" if value is None else str(value)
+    if value is None or value != value:  # NaN
+        return ""
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

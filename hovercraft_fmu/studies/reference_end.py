@@ -1,11 +1,11 @@
 """Where the craft really is at the end of a scene: a closed form where there is one, else an independent solver."""
 
-import importlib
 import itertools
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State, derivatives, friction_radius, slip_speed
@@ -21,9 +21,6 @@ def reference_end(scene: Scene, stop_time: float) -> tuple[State, float]:
     Without a closed form: DOP853 (Hairer, Norsett, Wanner: Solving Ordinary Differential Equations I), restarted at
     every row of the controls, which are taken as they are between rows: linear, not held; and where friction brings
     the craft to rest.
-
-    Raises:
-        ModuleNotFoundError: scipy is not installed; says how to install it.
     """
     if scene.exact:
         return State(*(float(part[0]) for part in scene.exact(np.array([stop_time])))), 0.0
@@ -48,7 +45,6 @@ def _stretch(
     craft: Craft, first: Row, last: Row, span: tuple[float, float], state: NDArray[np.float64], tolerance: float
 ) -> NDArray[np.float64]:
     """From row to row; with friction from rest to rest: it stands until a push lets it go."""
-    solve = scipy_module("integrate").solve_ivp
     begin, end = span
 
     def rates(time: float, y: NDArray[np.float64]) -> Any:
@@ -64,18 +60,8 @@ def _stretch(
     while begin < end:
         if craft.rubs and not any(rates(begin, state)):
             return state  # held until the next row: where friction counts, the controls of the scenes hold
-        solved = solve(rates, (begin, end), state, "DOP853", rtol=tolerance, atol=tolerance, events=events)
+        solved = solve_ivp(rates, (begin, end), state, "DOP853", rtol=tolerance, atol=tolerance, events=events)
         state, begin = solved.y[:, -1], float(solved.t[-1])
         if begin < end:
             state[3:] = 0.0
     return state
-
-
-def scipy_module(name: str) -> Any:
-    """scipy.NAME, with a clear message where scipy is missing."""
-    try:
-        return importlib.import_module(f"scipy.{name}")
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            "the trade is measured against scipy, which is not installed: pip install 'hovercraft-fmu[studies]'"
-        ) from error

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,11 +12,11 @@ import polars as pl
 from ..model.craft import DIRECTIONAL
 from ..model.dynamics import State
 from ..model.subcycling import advance
-from ..scenes import SCENES, Row, Scene
+from ..scenes import SCENES, Scene
 from ..simulation import Value, plan, schedule
 from ..view.palette import QUIET, SEA
 from ..view.plots import new_figure
-from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread, table
+from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,100 +33,45 @@ class Term(NamedTuple):
     """One thing that a scene may ask for, or do without."""
 
     name: str
-    what: str
+    set_to: str
     needed: str
     """When a scene needs it, in words."""
-    on: Callable[[Scene], Scene]
-    off: Callable[[Scene], Scene]
+    parameters: Mapping[str, Any] = {}
+    """With it on, unless the scene has its own."""
     settings: Mapping[str, Value] = {}
     """Of the run with it."""
+    wind: bool = False
+    opt_in: bool = True
+    """A scene's own is left out where the term is off."""
 
+    def on(self, scene: Scene) -> Scene:
+        """The scene with it."""
+        rows = scene.rows
+        if self.wind and not any(any(row[4:]) for row in rows):
+            rows = tuple((*row[:4], 0.0, WIND) for row in rows)
+        return replace(scene, rows=rows, parameters={**self.parameters, **scene.parameters})
 
-def _with(**parameters: Any) -> Callable[[Scene], Scene]:
-    """A scene with these parameters, unless it sets them itself."""
-    return lambda scene: replace(scene, parameters={**parameters, **scene.parameters})
-
-
-def _without(name: str) -> Callable[[Scene], Scene]:
-    return lambda scene: replace(scene, parameters={k: v for k, v in scene.parameters.items() if k != name})
-
-
-def _blown(scene: Scene) -> Scene:
-    """A scene in the wind, unless it has its own."""
-    if any(any(row[4:]) for row in scene.rows):
-        return scene
-    return replace(scene, rows=tuple((*row[:4], 0.0, WIND) for row in scene.rows))
-
-
-def _calm(scene: Scene) -> Scene:
-    rows: tuple[Row, ...] = tuple(row[:4] for row in scene.rows)
-    return replace(scene, rows=rows)
-
-
-def _same(scene: Scene) -> Scene:
-    return scene
+    def off(self, scene: Scene) -> Scene:
+        """The scene without it."""
+        rows = tuple(row[:4] if self.wind else row for row in scene.rows)
+        left = {k: v for k, v in scene.parameters.items() if not (self.opt_in and k in self.parameters)}
+        return replace(scene, rows=rows, parameters=left)
 
 
 TERMS = (
-    Term(
-        "wind",
-        f"wind.y = {WIND:g} m/s, or the scene's own",
-        "air that moves a tenth as fast as the craft, or faster",
-        _blown,
-        _calm,
-    ),
-    Term(
-        "directional area",
-        "drag_area = directional",
-        "a long craft that slides abeam or turns in dense air",
-        _with(drag_area=DIRECTIONAL),
-        _without("drag_area"),
-    ),
-    Term(
-        "skirt friction",
-        f"skirt_friction = {FRICTION:g}, or the scene's own",
-        "a craft that must stand still, stop, or wait for a push",
-        _with(skirt_friction=FRICTION),
-        _without("skirt_friction"),
-    ),
-    Term(
-        "rotational drag",
-        "rotational_drag = 1",
-        "spins and hard turns, whose end it decides",
-        _with(rotational_drag=1.0),
-        _without("rotational_drag"),
-    ),
-    Term(
-        "no drag",
-        "drag_coefficient = 0",
-        "(less than the default) seconds on ice; never a minute",
-        _with(drag_coefficient=0.0),
-        _same,
-    ),
-    Term(
-        "coarse step",
-        ", ".join(f"{name} = {value}" for name, value in COARSE.items()),
-        "(less than the default) a distant craft, and most near ones",
-        _same,
-        _same,
-        COARSE,
-    ),
-)
-
-
-class TermCost(NamedTuple):
-    """One term in one scene, at the default method and sub-step."""
-
-    term: str
-    scene: str
-    cost_ratio: float
-    """1: the bare model's time with the term over that without"""
-    position_difference: float
-    """m, at the end"""
-    heading_difference: float
-    """rad, at the end"""
-    path: float
-    """m: how far the scene's craft goes, to hold the difference against"""
+    Term("wind", f"wind.y = {WIND:g} m/s, or the scene's own", "air that moves a tenth as fast as the craft, or faster",
+         wind=True),
+    Term("directional area", "drag_area = directional", "a long craft that slides abeam or turns in dense air",
+         {"drag_area": DIRECTIONAL}),
+    Term("skirt friction", f"skirt_friction = {FRICTION:g}, or the scene's own",
+         "a craft that must stand still, stop, or wait for a push", {"skirt_friction": FRICTION}),
+    Term("rotational drag", "rotational_drag = 1", "spins and hard turns, whose end it decides",
+         {"rotational_drag": 1.0}),
+    Term("no drag", "drag_coefficient = 0", "(less than the default) seconds on ice; never a minute",
+         {"drag_coefficient": 0.0}, opt_in=False),
+    Term("coarse step", "integrator = rk4, step_size = 0.1",
+         "(less than the default) a distant craft, and most near ones", settings=COARSE),
+)  # fmt: skip
 
 
 def walk(scene: Scene, settings: Mapping[str, Value]) -> Ready[list[State]]:
@@ -148,7 +93,10 @@ SHOWN = ("turn", "ice", "drift_to_rest")
 
 
 def study(quick: bool, tell: Tell) -> Findings:
-    """Every term in every scene, with and without; quick: in the scenes of the short table, once."""
+    """Every term in every scene, with and without, at the default method; quick: three scenes, once.
+
+    The time of the bare model with the term over that without; how far the end moves [m, rad]; the length of the path.
+    """
     scenes = [SCENES[name] for name in SHOWN] if quick else list(SCENES.values())
     walks = {}
     for term, scene in itertools.product(TERMS, scenes):
@@ -158,11 +106,13 @@ def study(quick: bool, tell: Tell) -> Findings:
     rows = []
     for term, scene in itertools.product(TERMS, scenes):
         off, on = (timed[term.name, scene.name, whether] for whether in (False, True))
-        path = sum(math.dist(a[:2], b[:2]) for a, b in itertools.pairwise(off.found))
         a, b = off.found[-1], on.found[-1]
-        moved = math.dist(a[:2], b[:2]), abs(b.heading - a.heading)
-        rows.append(TermCost(term.name, scene.name, on.least / off.least, *moved, path))
-    found = table(rows)
+        rows.append({
+            "term": term.name, "scene": scene.name, "cost_ratio": on.least / off.least,
+            "position_difference": math.dist(a[:2], b[:2]), "heading_difference": abs(b.heading - a.heading),
+            "path": sum(math.dist(a[:2], b[:2]) for a, b in itertools.pairwise(off.found)),
+        })  # fmt: skip
+    found = pl.DataFrame(rows)
     short = [
         Shown("Each term: its price, and how far the end of a scene moves with it", _short(found), "scene_terms"),
         Shown("How far the end of each scene moves", _moved(found)),
@@ -186,15 +136,11 @@ def _short(found: pl.DataFrame) -> pl.DataFrame:
     path = {row["scene"]: row["path"] for row in found.filter(term="coarse step").iter_rows(named=True)}
     price, ends = prices(found), _moved(found)
     names = {name: f"end of `{name}` ({path[name]:.0f} m) moves by" for name in SHOWN}
-    return pl.DataFrame(
-        {
-            "term": [term.name for term in TERMS],
-            "set to": [term.what for term in TERMS],
-            "cost": [f"{price[term.name]:.2f} x" for term in TERMS],
-            **{title: ends[name] for name, title in names.items()},
-            "needed by": [term.needed for term in TERMS],
-        }
-    )
+    return pl.DataFrame({
+        "term": [term.name for term in TERMS], "set to": [term.set_to for term in TERMS],
+        "cost": [f"{price[term.name]:.2f} x" for term in TERMS], **{title: ends[name] for name, title in names.items()},
+        "needed by": [term.needed for term in TERMS],
+    })  # fmt: skip
 
 
 def _length(metres: float) -> str:

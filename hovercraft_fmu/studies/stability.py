@@ -49,7 +49,6 @@ term 0.76 and 0.57.
 """
 
 import itertools
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -59,13 +58,12 @@ import polars as pl
 
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State
-from ..model.integrators import MIN_STEP, Integrator
-from ..model.subcycling import Settings, advance
+from ..model.integrators import Integrator
 from ..view.palette import FAINT_LINE, INK, METHODS, QUIET, SHADES
 from ..view.plots import new_figure
-from .batches import ADAPTIVE, FIXED, Array, Batch, Mask, advanced, chosen, made, single
-from .extremes import ACCURATE, BATCH, FORMULAS, TOLERANCE, WARNED, measure_adaptive, measure_extremes, shares
-from .laboratory import Findings, Shown, Tell, part, table
+from .batches import FIXED, Array, Batch, Mask, advanced, chosen, made
+from .extremes import ACCURATE, BATCH, WARNED, measure_adaptive, measure_extremes, shares
+from .laboratory import Findings, Shown, Tell, part
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -198,42 +196,6 @@ def largest_step(motion: Motion, method: Integrator, quality: str) -> Array:
     return np.where(right.all(axis=1), np.inf, 0.5 * (x[craft, failed - 1] + x[craft, failed]))
 
 
-FIRST_STEPS = (0.02, 0.5, 1.5, 3.0, 30.0, 1e3, 1e6)
-"""Dimensionless first steps of the adaptive method."""
-UNITS = 30
-"""Of the motion's own time, that it runs on; a communication point after each."""
-
-
-def largest_first_step(motion: Motion) -> dict[str, list[float]]:
-    """For each quality and craft: the largest of FIRST_STEPS up to which the adaptive method has it; infinite for all.
-
-    Left out are craft whose whole time is so short that the smallest step, 1e-12 s, is no small part of it: there the
-    method refuses loudly.
-    """
-    limits: dict[str, list[float]] = {quality: [] for quality in QUALITIES}
-    for i in np.flatnonzero(motion.crafts.h > 1e4 * MIN_STEP):
-        right = [adaptive_qualities(motion, int(i), x) for x in FIRST_STEPS]
-        for quality, column in zip(QUALITIES, zip(*right, strict=True), strict=True):
-            good = [x for x, right in zip(FIRST_STEPS, column, strict=True) if right]
-            limits[quality].append(math.inf if len(good) == len(FIRST_STEPS) else max(good, default=0.0))
-    return limits
-
-
-def adaptive_qualities(motion: Motion, i: int, x: float) -> tuple[bool, bool, bool]:
-    """Monotone, stable, bounded: one craft of the motion with a first step, at a tolerance of 1e-9 of the scale."""
-    craft, controls, start, unit, _ = single(motion.crafts, i)
-    scale = motion.speed(start, craft)
-    settings = Settings(x * unit, ADAPTIVE, 1e-9 * float(abs(scale)))
-    state, proposed, gaps = _times(motion.near, start), 0.0, [1.0]
-    for _ in range(UNITS):
-        stretch = advance(state, controls, craft, unit, settings, proposed=proposed)
-        state, proposed = stretch.state, stretch.proposed
-        gaps.append(float(motion.gap(motion.speed(state, craft) / scale)))
-    slack = 1e-8 * UNITS / abs(motion.near - motion.goal)  # some steps' errors, in units of the gap
-    right = all(new <= old + slack and new >= -slack for old, new in itertools.pairwise(gaps))
-    return right, abs(gaps[-1]) < 0.999, max(map(abs, gaps)) < RUNAWAY
-
-
 THEORY: Mapping[tuple[str, str], tuple[float, float, float]] = MappingProxyType(
     {
         ("semi_implicit_euler", "coasting"): (1.0, 2.0, 2.0),
@@ -253,31 +215,15 @@ def theory(method: Integrator, motion: str) -> tuple[float, float, float]:
     return THEORY[method.name, "coasting" if motion == "spin" else motion]
 
 
-class Limit(NamedTuple):
-    """One row of the map."""
-
-    method: str
-    case: str
-    quality: str
-    smallest: float
-    """1, over the craft"""
-    largest: float
-    """1, over the craft"""
-    theory: float
-
-
-def measure_map(all_motions: Sequence[Motion], tell: Tell) -> list[Limit]:
-    """All limits of all methods."""
+def measure_map(all_motions: Sequence[Motion], tell: Tell) -> pl.DataFrame:
+    """All limits of all methods: the smallest and the largest dimensionless step over the craft, and the theory's."""
     rows, pairs = [], list(itertools.product(FIXED, all_motions))
     for done, (method, motion) in enumerate(pairs, 1):
         for quality, expected in zip(QUALITIES, theory(method, motion.name), strict=True):
             x = largest_step(motion, method, quality)
-            rows.append(Limit(method.name, motion.name, quality, float(x.min()), float(x.max()), expected))
+            rows.append((method.name, motion.name, quality, float(x.min()), float(x.max()), expected))
         tell(done / len(pairs))
-    for motion in all_motions:
-        for quality, limits in largest_first_step(motion).items():
-            rows.append(Limit(ADAPTIVE.name, motion.name, quality, min(limits), max(limits), math.inf))
-    return rows
+    return pl.DataFrame(rows, ("method", "case", "quality", "smallest", "largest", "theory"), orient="row")
 
 
 # ---- the study
@@ -295,31 +241,25 @@ def study(quick: bool, tell: Tell) -> Findings:
     figure = new_figure(figsize=(13.0, 4.6), dpi=75, layout="constrained")
     draw(figure, extremes)
     tell(1.0)
-    bounds = [f"bound of {name}: {each.constant:g}*{each.text}" for name, each in FORMULAS.items()]
-    bounds.append(f"bound of {ADAPTIVE.name}: 10*N*tolerance*max(1, V) of its N steps; tolerance = {TOLERANCE:g}")
     return Findings(
-        {"stability": table(limits), "extremes": rows},
+        {"stability": limits, "extremes": rows},
         [
             Shown("The largest dimensionless step (h*kappa*v0 coasting, h*kappa*v_t under thrust)", _map(limits)),
             Shown("Random extremes; shares of the runs", rows),
         ],
         {"stability": figure},
-        bounds,
     )
 
 
-def _map(limits: list[Limit]) -> pl.DataFrame:
+def _map(limits: pl.DataFrame) -> pl.DataFrame:
     """A row a method and motion: measured over the craft, and the theory's in brackets; half the stability number."""
-    cells = [
-        {"method": limit.method, "motion": limit.case, "quality": f"{limit.quality} up to", "limit": _range(limit)}
-        for limit in limits
-    ]
-    return pl.DataFrame(cells).pivot("quality", index=["method", "motion"], values="limit")
+    three = pl.struct("smallest", "largest", "theory").map_elements(_range, pl.String)
+    return limits.with_columns(limit=three).pivot("quality", index=["method", "case"], values="limit")
 
 
-def _range(limit: Limit) -> str:
-    numbers = [_number(value) for value in (limit.smallest, limit.largest, limit.theory)]
-    return f"{' ... '.join(dict.fromkeys(numbers[:2]))} ({numbers[2]})"
+def _range(row: Mapping[str, float]) -> str:
+    smallest, largest, expected = map(_number, row.values())
+    return f"{' ... '.join(dict.fromkeys((smallest, largest)))} ({expected})"
 
 
 def _number(value: float) -> str:

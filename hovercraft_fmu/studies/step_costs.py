@@ -1,201 +1,207 @@
-"""What the native FMU costs: a sub-step in C, and the calls of a host, beside the Python FMU; ratios in one run."""
+"""What a step costs: the native FMU beside the Python FMU, the bare model, and plain C; called by Python and by C."""
 
-import os
-import statistics
+import ctypes
 import subprocess
-import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from ctypes import c_double, c_int, c_size_t, c_uint, c_void_p
+from functools import partial
 from pathlib import Path
-from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
-import fmpy
-from rich.console import Group
+import polars as pl
 
 from ..fmu.description import NATIVE
-from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
-from ..fmu.machine_code import library, sources
+from ..fmu.interface import INPUTS
+from ..fmu.machine_code import sources
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
-from ..hosts import compiler, python_library
+from ..host import Fmu, Instance
+from ..hosts import COMPILERS, compiler
+from ..model.craft import Craft
+from ..model.dynamics import Controls, State, actuation
 from ..model.integrators import INTEGRATORS
-from ..simulation import instantiated, read_description
-from .rows import write_costs
+from ..model.subcycling import Settings, advance
+from .laboratory import Findings, Ready, Shown, Tell, Timed, interleaved, spread
+from .work_precision import OUTPUTS
 
-COMMUNICATION_STEPS = (0.01, 0.1, 1.0)
+STEP_SIZE = 0.001
 """s"""
-CALLS = {0.01: 100, 0.1: 20, 1.0: 4}
-"""Communication steps of one sample."""
-SAMPLES = 21
-OUTPUTS = [variable.reference for variable in VARIABLES if variable.causality == "output"]
+TOLERANCE = 1e-12
+"""SI units, of the adaptive method: thousands of its own steps in the time of a sample."""
+SUBSTEPS = 20_000
+"""Of a sample."""
+COMMUNICATION_STEPS = {0.01: 100, 0.1: 20, 1.0: 4}
+"""s -> how many are in a sample."""
+ROUNDS = 21
+CONTROLS = Controls(5.0, 0.5, 0.2)
+DRIVEN = INPUTS[:3]
 SOURCE = Path(__file__).parent / "step_costs.c"
+OPTIONS = ("-std=gnu11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC")
+OURS, PYTHON, BARE, PLAIN = "native FMU", "Python FMU", "bare model, in Python", "plain C loop with libm, -O3"
+WARNING = 1
+Cases: TypeAlias = Iterator[tuple[tuple[str, str], Ready[int]]]
+"""(what, whose) -> what returns how many of it were made."""
 
 
-class Cost(NamedTuple):
-    """A cost of the native FMU, and what it is compared with."""
+class Loops:
+    """The loops of step_costs.c.
 
-    what: str
-    unit: str
-    native: float
-    compared_with: str
-    other: float
+    Raises:
+        OSError: no C compiler, or it failed.
+    """
 
-    @property
-    def ratio(self) -> float:
-        """1: above 1 the native FMU is cheaper."""
-        return self.other / self.native
+    def __init__(self, folder: Path) -> None:
+        name = compiler()
+        if name is None:
+            raise OSError(f"no C compiler ({', '.join(COMPILERS)})")
+        for file, content in sources("0" * 32).items():
+            (folder / file).write_bytes(content)
+        path = folder / "step_costs.so"
+        command = [name, *OPTIONS, "-I", str(folder), str(SOURCE), "-o", str(path), "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise OSError(f"compiling {SOURCE.name} failed: {done.stderr.strip()}")
+        self._library = ctypes.CDLL(str(path))
+
+    def plain(self, state: State, controls: Controls, craft: Craft, h: float, n: int) -> State:
+        """n sub-steps of h [s] of semi-implicit Euler with plain drag, in one loop."""
+        constants = craft.mass, craft.inertia, craft.drag_factor, craft.drag_center, *actuation(controls, craft), h
+        values = (c_double * 6)(*state)
+        self._library.plain_loop(*map(c_double, constants), c_int(n), values)
+        return State(*values)
+
+    def on(self, instance: Instance, loop: str, functions: tuple[str, ...], *arguments: Any) -> None:
+        """Have a loop call functions of an instance's library."""
+        pointers = [ctypes.cast(instance.function(name), c_void_p) for name in functions]
+        status = getattr(self._library, loop)(*pointers, c_void_p(instance.component), *arguments)
+        if status > WARNING:
+            raise OSError(f"{loop}: the FMU returned {status}")
 
 
-def missing() -> str:
-    """Why it cannot be measured here; '' where it can."""
-    if sys.platform != "linux" or not compiler():
-        return "no C compiler (cc, gcc, clang) on Linux"
-    if reason := library(NATIVE).missing:
-        return reason
-    return "" if python_library() else "no shared library of Python (Debian: apt-get install libpython3-dev)"
+# ---- the cases
 
 
-def measure() -> list[Cost]:
-    """Time all cases, native beside Python FMU."""
+def _started(instance: Instance, go: Callable[[], int], values: Mapping[str, float | str]) -> Ready[int]:
+    def ready() -> Callable[[], int]:
+        instance.reset()
+        instance.start(values)
+        return go
+
+    return ready
+
+
+def substep_cases(native: Instance, loops: Loops | None) -> Cases:
+    """Each method in one long step, of the FMU and of the bare model; of the default the plain loop, too."""
+    duration, controls, count = SUBSTEPS * STEP_SIZE, native.port(*DRIVEN), native.port("substeps")
+
+    def step() -> int:
+        controls.set(CONTROLS[:3])
+        native.step(0.0, duration)
+        return int(count.get()[0])
+
+    def bare(way: Settings) -> int:
+        return advance(State(), CONTROLS, Craft(), duration, way).substeps
+
+    def plain(loops: Loops) -> int:
+        loops.plain(State(), CONTROLS, Craft(), STEP_SIZE, SUBSTEPS)
+        return SUBSTEPS
+
+    for method in INTEGRATORS:
+        what = f"{method.name}: a sub-step"
+        if loops and method is INTEGRATORS[0]:
+            yield (what, PLAIN), partial(partial, plain, loops)
+        own = ("integrator", method.name), ("step_size", STEP_SIZE), ("tolerance", TOLERANCE)
+        yield (what, OURS), _started(native, step, dict(own))
+        yield (what, BARE), partial(partial, bare, Settings(STEP_SIZE, method, TOLERANCE))
+
+
+def call_cases(name: str, instance: Instance, loops: Loops | None) -> Cases:
+    """Communication steps called by Python and, where there are loops, by C."""
+    inputs, outputs = instance.port(*DRIVEN), instance.port(*OUTPUTS)
+    known = {variable.name: variable.valueReference for variable in instance.description.modelVariables}
+    driven, read = ((c_uint * len(names))(*(known[each] for each in names)) for names in (DRIVEN, OUTPUTS))
+    given, values = (c_double * len(DRIVEN))(*CONTROLS[:3]), (c_double * len(OUTPUTS))()
+
+    def by_python(step: float, n: int) -> int:
+        for k in range(n):
+            inputs.set(CONTROLS[:3])
+            instance.step(k * step, step)
+            outputs.get()
+        return n
+
+    def by_c(loops: Loops, step: float, n: int) -> int:
+        loops.on(instance, "step_loop", ("SetReal", "DoStep", "GetReal"), driven, c_size_t(len(driven)), given, read,
+                 c_size_t(len(read)), values, c_double(step), n)  # fmt: skip
+        return n
+
+    for step, n in COMMUNICATION_STEPS.items():
+        what = f"set, doStep of {step:g} s, get"
+        yield (f"fmpy: {what}", name), _started(instance, partial(by_python, step, n), {})
+        if loops:
+            yield (f"C host: {what}", name), _started(instance, partial(by_c, loops, step, n), {})
+
+
+def evaluation_case(solving: Instance, loops: Loops) -> Cases:
+    """Model exchange: time, states, derivatives, as a solver asks for them."""
+
+    def go() -> int:
+        solving.update_discrete_states()
+        solving.enter_continuous_time_mode()
+        names = "SetTime", "SetContinuousStates", "GetDerivatives"
+        loops.on(solving, "evaluation_loop", names, c_double(STEP_SIZE), SUBSTEPS)
+        return SUBSTEPS
+
+    yield ("C host: set time and states, get derivatives", OURS), _started(solving, go, {})
+
+
+def load_cases(name: str, path: Path) -> Cases:
+    """A file opened, one instance, and both closed."""
+
+    def load() -> int:
+        with Fmu(path) as fmu, fmu.instance():
+            return 1
+
+    yield ("fmpy: extract, load, instantiate, free", name), lambda: load
+
+
+# ---- the study
+
+
+def study(quick: bool, tell: Tell) -> Findings:
+    """All cases; quick: a quarter of the rounds. Without a C compiler those called by Python alone."""
+    notes, loops = [], None
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        native, python = build_native_fmu(folder / "Native.fmu"), build_fmu(folder / "Python.fmu")
-        calls = _through_fmpy(native, python)
-        in_c = _in_c(folder / "native", native, "substeps"), _in_c(folder / "python", python)
-    return [
-        *_substeps(in_c[0]),
-        _evaluation(in_c[0]),
-        *_calls("fmpy", *calls),
-        *_calls("C host", *in_c),
-        *_instances(*in_c),
-    ]
+        try:
+            loops = Loops(folder)
+        except OSError as error:
+            notes.append(f"Calls by C were not measured: {error}")
+        paths = build_native_fmu(folder / "Native.fmu"), build_fmu(folder / "Python.fmu")
+        with (
+            Fmu(paths[0]) as native, Fmu(paths[1]) as python, native.instance() as one, python.instance() as other,
+            native.instance(exchange=True) as solving,
+        ):  # fmt: skip
+            cases = [*substep_cases(one, loops), *call_cases(OURS, one, loops), *call_cases(PYTHON, other, loops)]
+            cases += [*load_cases(OURS, paths[0]), *load_cases(PYTHON, paths[1])]
+            cases += evaluation_case(solving, loops) if loops else []
+            timed = interleaved(dict(cases), 5 if quick else ROUNDS, tell)
+    found = compared(timed)
+    notes.append(spread(timed.values()))
+    return Findings({"native": found}, [Shown(f"What {NATIVE.identifier} costs", found, "native")], notes=notes)
 
 
-def _substeps(found: Mapping[str, float]) -> list[Cost]:
-    """Each method beside the same C with libm; the first and the last beside plain loops, too."""
-    others = {"plain": "plain C loop with libm, -O3", "libm": "the same with libm, -O3"}
-    return [
-        Cost(f"{method.name}: a sub-step", "ns", found[f"substep_{method.name}"], text, found[f"{other}_{method.name}"])
-        for method in INTEGRATORS
-        for other, text in others.items()
-        if f"{other}_{method.name}" in found
-    ]
-
-
-def _evaluation(found: Mapping[str, float]) -> Cost:
-    """The loads and the interface of model exchange, beside the loads and the method in co-simulation."""
-    what = "C host: set time and states, get derivatives"
-    return Cost(what, "ns", found["evaluation"], "a quarter of a sub-step of rk4", found["substep_rk4"] / 4.0)
-
-
-def _calls(host: str, native: Mapping[str, float], python: Mapping[str, float]) -> list[Cost]:
-    return [
-        Cost(f"{host}: set, doStep of {step:g} s, get", "us", native[f"calls_{step:g}"], "Python FMU",
-             python[f"calls_{step:g}"])
-        for step in COMMUNICATION_STEPS
-    ]  # fmt: skip
-
-
-def _instances(native: Mapping[str, float], python: Mapping[str, float]) -> list[Cost]:
-    rows = (
-        ("load, first instance", "load", "us"),
-        ("instantiate, free", "instantiate", "us"),
-        ("memory of an instance", "memory", "bytes"),
-    )
-    return [Cost(what, unit, native[key], "Python FMU", python[key]) for what, key, unit in rows]
-
-
-# ---- in C
-
-
-def _in_c(folder: Path, fmu: Path, *options: str) -> dict[str, float]:
-    """What the program in C measures of an FMU."""
-    folder.mkdir()
-    description = fmpy.read_model_description(fmu)
-    fmpy.extract(fmu, unzipdir=str(folder))
-    library = folder / "binaries" / "linux64" / f"{description.coSimulation.modelIdentifier}.so"
-    resources = (folder / "resources").as_uri()
-    env = {"PATH": os.defpath, "LD_PRELOAD": "" if options else python_library() or ""}
-    command = [str(_program(folder)), str(library), description.guid, resources, *options]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise OSError(f"measuring in C failed: {done.stderr.strip()}")
-    return {name: float(value) for name, value in (line.split() for line in done.stdout.splitlines())}
-
-
-def _program(folder: Path) -> Path:
-    """The program, with the kernel in it that it compares with."""
-    place = folder / "program"
-    place.mkdir()
-    for name, content in sources("0" * 32).items():
-        (place / name).write_bytes(content)
-    command = [compiler() or "cc", "-std=gnu11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-DHOVERCRAFT_LIBM",
-               "-I", str(place), str(SOURCE), str(place / "kernel.c"), "-lm", "-ldl", "-o",
-               str(place / "costs")]  # fmt: skip
-    subprocess.run(command, check=True)
-    return place / "costs"
-
-
-# ---- through fmpy
-
-
-def _through_fmpy(native: Path, python: Path) -> tuple[dict[str, float], dict[str, float]]:
-    """us a communication step, interleaved: a slow moment of the machine hits both alike."""
-    samples: dict[tuple[int, float], list[float]] = {}
-    with (
-        instantiated(native, read_description(native), []) as (_, one),
-        instantiated(python, read_description(python), []) as (_, other),
-    ):
-        cases = [_started(one), _started(other)]
-        for _ in range(SAMPLES):
-            for step in COMMUNICATION_STEPS:
-                for i, case in enumerate(cases):
-                    samples.setdefault((i, step), []).append(case(step))
-    medians = [
-        {f"calls_{step:g}": statistics.median(samples[i, step]) * 1e6 for step in COMMUNICATION_STEPS} for i in (0, 1)
-    ]
-    return medians[0], medians[1]
-
-
-def _started(instance: Any) -> Callable[[float], float]:
-    """Seconds of a communication step of a size; arrays are made once, as in fmpy's own loop."""
-    instance.setupExperiment()
-    instance.enterInitializationMode()
-    instance.exitInitializationMode()
-    inputs = (fmpy.fmi2.fmi2ValueReference * len(INPUTS))(*(BY_NAME[name].reference for name in INPUTS))
-    outputs = (fmpy.fmi2.fmi2ValueReference * len(OUTPUTS))(*OUTPUTS)
-    controls = (fmpy.fmi2.fmi2Real * len(INPUTS))(5.0, 0.5, 0.2)
-    values = (fmpy.fmi2.fmi2Real * len(OUTPUTS))()
-    time = 0.0
-
-    def sample(step: float) -> float:
-        nonlocal time
-        begun = perf_counter()
-        for _ in range(CALLS[step]):
-            instance.fmi2SetReal(instance.component, inputs, len(INPUTS), controls)
-            instance.fmi2DoStep(instance.component, time, step, fmpy.fmi2.fmi2True)
-            instance.fmi2GetReal(instance.component, outputs, len(OUTPUTS), values)
-            time += step
-        return (perf_counter() - begun) / CALLS[step]
-
-    return sample
-
-
-# ---- what is printed
-
-
-def run(folder: Path) -> Group:
-    """Measure, write native.csv and native.md into the folder, and return what is to be printed."""
-    if why := missing():
-        return Group(f"\nThe native FMU was not measured: {why}")
-    table = write_costs(folder / "native", measure(), _cells, TITLES)
-    return Group(f"\nWhat {NATIVE.identifier} costs", table)
-
-
-TITLES = ("what", "native", "compared with", "that", "ratio")
-
-
-def _cells(cost: Cost) -> tuple[str, ...]:
-    native, other = (f"{value:.3g} {cost.unit}" for value in (cost.native, cost.other))
-    return cost.what, native, cost.compared_with, other, f"{cost.ratio:.3g} x"
+def compared(timed: Mapping[tuple[str, str], Timed[int]]) -> pl.DataFrame:
+    """The native FMU's costs beside those of others, in a unit; ratio [1]: above 1 the native FMU is cheaper."""
+    rows = []
+    for (what, whose), other in timed.items():
+        own, factor, label = timed[what, OURS], 1.0, whose
+        if what.endswith("derivatives"):
+            other, factor, label = timed["rk4: a sub-step", OURS], 0.25, "a quarter of a sub-step of rk4"
+        elif whose == OURS:
+            continue
+        unit, scale = ("us", 1e6) if "doStep" in what or "load" in what else ("ns", 1e9)
+        native, that = scale * own.least / own.found, factor * scale * other.least / other.found
+        rows.append({"what": what, "unit": unit, "native": native, "compared_with": label, "other": that,
+                     "ratio": that / native, "spread": max(own.spread, other.spread)})  # fmt: skip
+    return pl.DataFrame(rows)
