@@ -4,27 +4,23 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import fmpy
-import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
 from hovercraft_fmu.fmu.interface import STATES
-from hovercraft_fmu.host import SimulationError
+from hovercraft_fmu.host import Fmu, Instance, SimulationError
 from hovercraft_fmu.scenes import SCENES, Scene, held
 from hovercraft_fmu.simulation import plan
-from hovercraft_fmu.studies.model_exchange import SMOOTH, TOLERANCES, Calls, solved
+from hovercraft_fmu.studies.model_exchange import SMOOTH, TOLERANCES, solved
 from hovercraft_fmu.studies.reference_end import reference_end
-from hovercraft_fmu.studies.trade import STOP_TIME
-from tests.conftest import FMI_2
-from tests.lowlevel import one
+from hovercraft_fmu.studies.work_precision import STOP_TIME, fitted, largest
 
 
 @pytest.fixture(scope="module")
-def shared(each_native_fmu: Path) -> Iterator[tuple[Any, list[str]]]:
-    with one(each_native_fmu, exchange=True) as made:
+def shared(each_native_fmu: Path) -> Iterator[Instance]:
+    with Fmu(each_native_fmu) as fmu, fmu.instance(exchange=True) as made:
         yield made
 
 
@@ -36,21 +32,16 @@ def test_fmpy_takes_co_simulation_unless_asked(native_fmu: Path) -> None:
     assert solved["pose.x"][-1] == pytest.approx(stepped["pose.x"][-1], abs=1e-4)
 
 
-@FMI_2
 @pytest.mark.once
 @pytest.mark.parametrize("scene", SMOOTH, ids=lambda scene: scene.name)
-def test_cvode_meets_the_reference_and_its_error_follows_the_tolerance(
-    scene: Scene, shared: tuple[Any, list[str]]
-) -> None:
+def test_cvode_meets_the_reference_and_its_error_follows_the_tolerance(scene: Scene, shared: Instance) -> None:
     """Over seven decades. CVode bounds the error of a step, relative to the states and their nominals; they add up."""
     exact, uncertainty = reference_end(scene, STOP_TIME)
     errors = []
     for tolerance in TOLERANCES:
-        _, end, _ = solved(Calls(shared[0], scene, shared[1]), tolerance)
-        errors.append(max(abs(a - b) for a, b in zip(end, exact, strict=True)))
+        errors.append(largest(solved(shared, scene, tolerance)()().end, exact))
         assert errors[-1] <= 500.0 * tolerance * max(1.0, *map(abs, exact)) + uncertainty
-    slope = np.polyfit(np.log(TOLERANCES), np.log(errors), 1)[0]
-    assert slope == pytest.approx(0.9, abs=0.2)
+    assert fitted(TOLERANCES, errors) == pytest.approx(0.9, abs=0.2)
 
 
 @pytest.mark.parametrize("name", [scene.name for scene in SMOOTH if scene.name not in ("slalom", "ice")])
@@ -79,12 +70,12 @@ def test_fmpy_alone_holds_ramps_over_an_output_interval(native_fmu: Path) -> Non
     assert math.log10(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
 
 
-@FMI_2
-def test_what_the_fmu_says_to_the_solver_is_told(shared: tuple[Any, list[str]]) -> None:
+def test_what_the_fmu_says_to_the_solver_is_told(shared: Instance) -> None:
     """CVode is C: an exception of fmpy's does not come through it."""
     scene = replace(SCENES["launch"], rows=held(STOP_TIME, (0.0, 99.0, 0.0, 0.0)))
+    go = solved(shared, scene, 1e-6)()
     with pytest.raises(SimulationError, match=r"thrust = 99\.0: is outside its limits"):
-        solved(Calls(shared[0], scene, shared[1]), 1e-6)
+        go()
 
 
 def test_fmpy_refuses_the_scene_with_friction(native_fmu: Path) -> None:

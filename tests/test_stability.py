@@ -171,7 +171,7 @@ def test_the_adaptive_method_takes_any_first_step(motion: Motion, x: float) -> N
     slow = np.flatnonzero(motion.crafts.h > 1e4 * MIN_STEP)
     assert len(slow) >= 3
     for i in slow:
-        craft, controls, start, unit, _ = single(motion.crafts, i)
+        craft, controls, start, unit, _ = single(motion.crafts, int(i))
         scale = motion.speed(start, craft)
         way = Settings(x * unit, ADAPTIVE, 1e-9 * float(abs(scale)))
         state, proposed, gaps = State(*(motion.near * value for value in start)), 0.0, [1.0]

@@ -1,8 +1,8 @@
 """Sweeps: a run of one has the bits of `simulate`, whoever makes it, when and beside what."""
 
 import contextlib
-import itertools
 import csv
+import itertools
 import json
 import math
 import os

@@ -156,16 +156,18 @@ def test_the_quick_trade(tmp_path: Path, native_fmu: Path) -> None:
     assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in advice)
     assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in records(RESULTS / "advice.csv"))
     same = ("scene", "integrator", "step_size", "tolerance", "communication_step")
-    committed = {tuple(row[name] for name in same): row for row in map(numbers, records(RESULTS / "work_precision.csv"))}
+    committed = {
+        tuple(row[name] for name in same): row for row in map(numbers, records(RESULTS / "work_precision.csv"))
+    }
     for row in map(numbers, rows):
         known = committed[tuple(row[name] for name in same)]
         assert row["position_error"] == pytest.approx(known["position_error"], rel=1e-3, abs=1e-10)
     assert (tmp_path / "work_precision.png").stat().st_size > 10000
     chosen, runs = records(tmp_path / "exchange.csv"), records(tmp_path / "exchange_runs.csv")
     assert [float(row["accuracy_m"]) for row in chosen] == list(model_exchange.ACCURACIES)
-    before = records(RESULTS / "exchange_runs.csv")
-    assert {row["scene"] for row in before} == {scene.name for scene in model_exchange.SMOOTH}
-    for ours, theirs in zip(runs, [row for row in before if row["scene"] == "turn"], strict=True):
+    others = records(RESULTS / "exchange_runs.csv")
+    assert {row["scene"] for row in others} == {scene.name for scene in model_exchange.SMOOTH}
+    for ours, theirs in zip(runs, [row for row in others if row["scene"] == "turn"], strict=True):
         assert ours["solver"] == theirs["solver"]
         assert float(ours["error"]) <= 2.0 * float(theirs["error"]) + 1e-10
     assert "| accuracy [m]" in printed

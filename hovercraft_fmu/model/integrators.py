@@ -412,7 +412,7 @@ class Integrator(NamedTuple):
     stability_limit: float
     """1: the largest sub-step times the fastest linearized drag rate up to which answers can be trusted."""
     rotation_limit: float
-    """rad: the largest turn in a sub-step up to which they can. Both are measured: hovercraft-fmu stability."""
+    """rad: the largest turn in a sub-step up to which they can. Both are measured: hovercraft-fmu measure stability."""
 
 
 INTEGRATORS = (
