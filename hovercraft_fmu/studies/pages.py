@@ -30,7 +30,7 @@ from ..sweep import sweep
 from ..sweep.plots import plot_sweep
 from ..sweep.study import SHIPPED
 from ..view.plots import plot_passage, plot_run
-from . import closed_loop, scene_terms
+from . import closed_loop, scene_terms, work_precision
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +50,7 @@ PICTURES: Mapping[str, tuple[Path, ...]] = {
 DRAWN: Mapping[str, Callable[[pl.DataFrame], "Figure"]] = {
     "coupling.svg": closed_loop.draw,
     "scene_terms.svg": scene_terms.draw,
+    "work_precision.svg": work_precision.draw_work_precision,
 }
 """Those that are drawn of their table alone."""
 COLORS = 32
