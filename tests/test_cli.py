@@ -1,9 +1,11 @@
 """The command as its user meets it, in an empty folder; as a program of its own it is in test_readme.py."""
 
+import os
 import re
 import subprocess
 import sys
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -46,6 +48,16 @@ def test_demo(shell: Shell) -> None:
         assert picture.size == (1440, 810)
     for command in commands:
         shell.ok(*command.split()[1:])
+
+
+def test_a_control_log_is_read_once(shell: Shell, fmu: Path) -> None:
+    """So it may come through a pipe."""
+    pipe = shell.folder / "piped.csv"
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(pipe.write_text, "time,thrust\n0,5\n1,5\n")
+        printed = shell.ok("simulate", str(fmu), "--input", "piped.csv", "--set", "step_size=0.01")
+    assert "1 s, 100 communication steps" in printed
 
 
 def test_build_and_validate(shell: Shell) -> None:
