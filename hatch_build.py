@@ -1,6 +1,7 @@
-"""The build hook: machine code of the native FMUs, compiled when a wheel is made or a checkout is installed."""
+"""Hooks of the build: machine code of the native FMUs, compiled when a wheel is made; the README of a package index."""
 
 import os
+import re
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -8,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 from packaging.tags import sys_tags
 
 HAVE_COMPILER = {
@@ -46,3 +48,16 @@ def _machine_code(root: str) -> Any:
     package.__path__ = [str(Path(root) / "hovercraft_fmu")]
     sys.modules["hovercraft_fmu"] = package
     return import_module("hovercraft_fmu.fmu.machine_code")
+
+
+class ReadmeHook(MetadataHookInterface):  # type: ignore[misc, unused-ignore]
+    """The README as a package index shows it, where no file stands beside it: without pictures and links to files."""
+
+    PLUGIN_NAME = "custom"
+
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Put it in."""
+        text = (Path(self.root) / "README.md").read_text(encoding="utf-8")
+        text = re.sub(r"^!\[[^\]]*\]\((?!https:)[^)]*\)\n+", "", text, flags=re.MULTILINE)
+        text = re.sub(r"\[([^\]]*)\]\((?!https:|#)[^)]*\)", r"\1", text)
+        metadata["readme"] = {"content-type": "text/markdown", "text": text}

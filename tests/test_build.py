@@ -1,22 +1,22 @@
 """Two builds of one tree give the same bytes; a build that fails leaves what was there."""
 
 import hashlib
+import os
+import shutil
 import subprocess
 import sys
+import tarfile
 from pathlib import Path
 
 import pytest
 
 from hovercraft_fmu import build_fmu
-from tests.conftest import HERE, ROOT, Fresh
+from hovercraft_fmu.fmu.machine_code import LEAVE_OUT
+from tests.conftest import FMI_2, ROOT, Fresh
 
 BUILD = "import sys, os; os.umask(int(sys.argv[1], 8)); import hovercraft_fmu as h; print(h.build_fmu(), h.__file__)"
 
-BUILD_NATIVE = """
-import sys
-from hovercraft_fmu.fmu.native_package import build_native_fmu
-build_native_fmu(platforms=sys.argv[1:])
-"""
+BUILD_NATIVE = "import hovercraft_fmu as h; h.build()"
 
 
 def digest(path: Path) -> str:
@@ -29,18 +29,63 @@ def test_the_same_bytes_elsewhere(fmu: Path, fresh: Fresh, tmp_path: Path, umask
     assert digest(tmp_path / "build" / "Hovercraft.fmu") == digest(fmu)
 
 
-def test_the_same_bytes_from_an_installed_wheel(fmu: Path, native_fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
-    wheels, installed = tmp_path / "wheels", tmp_path / "installed"
+def archives(kind: str, place: Path, out: Path) -> Path:
+    """What the build front end makes of a folder, with the tools of this environment."""
+    command = [sys.executable, "-m", "build", f"--{kind}", "--no-isolation", "--outdir", str(out), str(place)]
+    subprocess.run(command, check=True, capture_output=True)
+    (made,) = out.iterdir()
+    return made
+
+
+@pytest.mark.once
+@FMI_2
+def test_the_wheel_of_a_checkout_and_of_the_sdist_and_their_fmus(
+    fmu: Path, complete_native_fmu: Path, fresh: Fresh, tmp_path: Path
+) -> None:
+    """The same bytes, for any Python, at most 4 MB; nothing in the sdist that only looks like its files."""
+    wheel, sdist = (archives(kind, ROOT, tmp_path / kind) for kind in ("wheel", "sdist"))
+    assert wheel.name.endswith("-py3-none-any.whl")
+    assert wheel.stat().st_size <= 4_000_000
+    with tarfile.open(sdist) as archive:
+        top = {name.split("/")[1] for name in archive.getnames()}
+        assert not [name for name in archive.getnames() if "/compiled/" in name or "site-packages" in name]
+        archive.extractall(tmp_path / "unpacked", filter="data")
+    assert top == {
+        ".gitignore", ".readme", "CHANGELOG.md", "CITATION.cff", "LICENSE", "PKG-INFO", "README.md", "SECURITY.md",
+        "hatch_build.py", "hovercraft_fmu", "licenses", "pyproject.toml", "tests",
+    }  # fmt: skip
+    (unpacked,) = (tmp_path / "unpacked").iterdir()
+    assert archives("wheel", unpacked, tmp_path / "again").read_bytes() == wheel.read_bytes()
+    installed = tmp_path / "installed"
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
-    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(wheels), str(ROOT)]
-    subprocess.run(build, check=True, capture_output=True)
-    (wheel,) = wheels.glob("*.whl")
     subprocess.run([*pip, "install", "--no-deps", "--target", str(installed), str(wheel)], check=True)
     printed = fresh(BUILD, "022", env={"PYTHONPATH": str(installed)})
     assert printed.split()[1].startswith(str(installed))
     assert digest(tmp_path / "build" / "Hovercraft.fmu") == digest(fmu)
-    fresh(BUILD_NATIVE, *HERE[sys.platform], env={"PYTHONPATH": str(installed)})
-    assert digest(tmp_path / "build" / "HovercraftNative.fmu") == digest(native_fmu)
+    fresh(BUILD_NATIVE, env={"PYTHONPATH": str(installed)})
+    assert digest(tmp_path / "build" / "HovercraftNative.fmu") == digest(complete_native_fmu)
+
+
+@pytest.mark.once
+def test_a_wheel_without_a_compiler_says_what_is_missing(fresh: Fresh, tmp_path: Path) -> None:
+    """The install succeeds, and shows nothing of what the hook printed."""
+    apart, installed = tmp_path / "apart", tmp_path / "installed"
+    shutil.copytree(ROOT, apart, ignore=shutil.ignore_patterns("compiled", ".venv*", ".git", "build", "dist", "tests"))
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "install", "--no-deps"]
+    environment = {**os.environ, LEAVE_OUT: "1"}
+    command = [*pip, "--no-build-isolation", "--target", str(installed), str(apart)]
+    subprocess.run(command, check=True, env=environment)
+    code = """
+import hovercraft_fmu as h
+print(h.build("python"))
+try:
+    h.build()
+except OSError as error:
+    print(error)
+"""
+    python, missing = fresh(code, env={"PYTHONPATH": str(installed)}).splitlines()
+    assert python == str(Path("build/Hovercraft.fmu"))
+    assert missing.startswith(f"no machine code: {LEAVE_OUT} is set; install a wheel that has it: pip install ")
 
 
 def test_a_build_leaves_the_process_as_it_was(tmp_path: Path) -> None:

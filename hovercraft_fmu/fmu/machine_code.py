@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ from functools import cached_property
 from importlib import metadata, resources
 from pathlib import Path
 
-from .archive import digest
+from .archive import digest, write_archive
 from .description import NATIVE, NATIVE3, Flavour, model_description, xml
 from .native_header import variables_header
 
@@ -179,10 +178,9 @@ def compile_all(platforms: Iterable[str] | None = None) -> str:
 
 
 def _forget(keep: set[Path]) -> None:
-    """All folders but these, and what compilations that were killed have left."""
+    """All folders but these."""
     for path in COMPILED.iterdir():
-        at_work = path.name.startswith(".") and time.time() - path.stat().st_mtime < TIME_LIMIT
-        if path.is_dir() and path not in keep and not at_work:
+        if path.is_dir() and path not in keep:
             shutil.rmtree(path, ignore_errors=True)  # on Windows one that is loaded stays
 
 
@@ -192,7 +190,7 @@ def _compile(wanted: Sequence[Library], platforms: Iterable[str]) -> None:
     if not jobs:
         return
     _require_compiler()
-    with tempfile.TemporaryDirectory(prefix=".", dir=COMPILED) as place, ThreadPoolExecutor(os.cpu_count()) as pool:
+    with tempfile.TemporaryDirectory(prefix="hovercraft_native_") as place, ThreadPoolExecutor(os.cpu_count()) as pool:
         folder = Path(place)
         for each in {each.name: each for each, _ in jobs}.values():
             (folder / each.name).mkdir()
@@ -215,8 +213,7 @@ def _compile_one(each: Library, name: str, folder: Path) -> None:
     )  # fmt: skip
     if done.returncode != 0:
         raise OSError(f"compiling {each.name} for {platform.target} failed: {done.stderr.strip()}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    (made / path.name).replace(path)
+    write_archive(path, (made / path.name).read_bytes, path.suffix)
 
 
 def compiler(platform: Platform) -> list[str]:
