@@ -19,8 +19,9 @@ from lxml import etree
 from hovercraft_fmu.autopilot.guidance import Gains, Pilot, Waypoint, steer
 from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, GAINS, VARIABLES
 from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, STATES
+from hovercraft_fmu.host import read_description
 from hovercraft_fmu.model.dynamics import State
-from hovercraft_fmu.simulation import plan, read_description, run_fmu
+from hovercraft_fmu.simulation import plan, run_fmu
 from hovercraft_fmu.validation import SCHEMAS, validate, validate_elsewhere
 from tests.blobs import with_build
 from tests.conftest import Fresh

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hovercraft_fmu.fmu.interface import BY_NAME, DERIVATIVES, INPUT_HELD, INPUTS, MOTION, STATES, WATCHED
+from hovercraft_fmu.host import read_description
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import (
     Controls,
@@ -20,7 +21,6 @@ from hovercraft_fmu.model.dynamics import (
     derivatives,
 )
 from hovercraft_fmu.model.observation import observe_action, observe_motion
-from hovercraft_fmu.simulation import read_description
 from tests.conftest import FMI_2
 from tests.exchange import (
     EVERYWHERE,

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from hovercraft_fmu.fmu.description import NATIVE3
 from hovercraft_fmu.fmu.interface import DERIVATIVES, INPUTS, MOTION, STATES, TIME, VARIABLES
+from hovercraft_fmu.host import read_description
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import plan, read_description, run_fmu
+from hovercraft_fmu.simulation import plan, run_fmu
 from tests.lowlevel import everything, one, put, reference, start
 from tests.test_native import METHODS, STEPS
 

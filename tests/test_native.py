@@ -24,9 +24,10 @@ from hypothesis import strategies as st
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STEP_UNSTABLE
 from hovercraft_fmu.fmu.native_package import binary
+from hovercraft_fmu.host import read_description
 from hovercraft_fmu.hosts import hosts_of, run_in
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import plan, read_description, run_fmu, run_model
+from hovercraft_fmu.simulation import plan, run_fmu, run_model
 from tests.blobs import signed, with_word
 from tests.conftest import FMI_2, ROOT
 from tests.lowlevel import Instance3, count, everything, get, named, one, put, reference, start, worded

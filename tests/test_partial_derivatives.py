@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hovercraft_fmu.fmu.interface import INPUTS, STATES
+from hovercraft_fmu.host import read_description
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import (
     Controls,
@@ -21,7 +22,6 @@ from hovercraft_fmu.model.dynamics import (
     load_function,
     sliding_load_function,
 )
-from hovercraft_fmu.simulation import read_description
 from tests.exchange import (
     INITIAL_KNOWNS,
     INITIAL_UNKNOWNS,

@@ -1,8 +1,6 @@
 """Plans a scene, or inputs of your own, and runs it: on an FMU, or on the bare model; one kind of result."""
 
-from ..host import read_description
 from .bare_run import run_model
-from .by_hand import instantiated
 from .control_log import read_inputs
 from .fmu_run import DEFAULT_FMU, Stepper, default_fmu, run_fmu, simulate, stepping
 from .planning import Inputs, Progress, Run, Value, method_in_words, plan, start_value
@@ -20,11 +18,9 @@ __all__ = [
     "communication_points",
     "controls_at",
     "default_fmu",
-    "instantiated",
     "method_in_words",
     "path_length",
     "plan",
-    "read_description",
     "read_inputs",
     "run_fmu",
     "run_model",

@@ -25,9 +25,9 @@ from distributed.comm.addressing import get_address_host_port
 
 from .._version import __version__
 from ..fmu.interface import HOVERCRAFT
-from ..host import SimulationError
+from ..host import SimulationError, read_description
 from ..model.integrators import INTEGRATORS
-from ..simulation import default_fmu, read_description
+from ..simulation import default_fmu
 from .batch import run_batch
 from .engines import SETTINGS, Driver, Plan
 from .quantities import quantity_function, row_columns
