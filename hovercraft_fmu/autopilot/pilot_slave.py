@@ -41,20 +41,20 @@ class AutopilotSlave(Slave):
             raise ValueError(f"{variable.name} = {value!r}: must be from 1 to {WAYPOINTS_MAX}")
 
     def _take_up_start_values(self) -> None:
-        reals = self._reals
+        given = self._given
         self._take_up_parameters()
-        self._pilot = Pilot(Waypoint(reals[MOTION[0]], reals[MOTION[1]]))
+        self._pilot = Pilot(Waypoint(given[MOTION[0]], given[MOTION[1]]))
         self._sample(0.0, self._gains)
         self._tuned = False
         self._stale = True
 
     def _take_up_parameters(self) -> None:
-        reals = self._reals
-        self._course = tuple(Waypoint(reals[x], reals[y]) for x, y in WAYPOINTS[: self._integers[COUNT]])
+        given = self._given
+        self._course = tuple(Waypoint(given[x], given[y]) for x, y in WAYPOINTS[: self._integers[COUNT]])
         self._gains = self._make_gains()
 
     def _make_gains(self) -> Gains:
-        return Gains(*(self._reals[reference] for reference in GAIN_REFERENCES))
+        return Gains(*(self._given[reference] for reference in GAIN_REFERENCES))
 
     def _advance(self, step_size: float) -> None:
         gains = self._make_gains() if self._tuned else self._gains
@@ -62,23 +62,20 @@ class AutopilotSlave(Slave):
         self._gains, self._tuned = gains, False
 
     def _sample(self, duration: float, gains: Gains) -> None:
-        motion = State(*(self._reals[reference] for reference in MOTION))
+        motion = State(*(self._given[reference] for reference in MOTION))
         pilot, commands, sight = steer(self._pilot, motion, self._course, gains, duration)
         refuse_non_finite(SHOWN, (*commands, *sight))
         self._pilot, self._commands, self._sight = pilot, commands, sight
 
-    def _observe(self) -> None:
-        if not self._started():
-            self._take_up_start_values()
-        self._reals.update(zip(SHOWN_REFERENCES, (*self._commands, *self._sight), strict=True))
+    def _observe(self) -> dict[int, float]:
         reached, count = self._pilot.reached, len(self._course)
         self._integers[ACTIVE] = min(reached + 1, count)
         self._booleans[ARRIVED] = reached == count
-        self._stale = False
+        return dict(zip(SHOWN_REFERENCES, (*self._commands, *self._sight), strict=True))
 
     def _observe_discrete(self) -> None:
         if self._stale:
-            self._observe()
+            self._look()
 
     def _own_state(self) -> dict[str, Any]:
         return {

@@ -27,14 +27,15 @@ class Slave(WrappedSlave):
     """A digest of all that is in the FMU; the entry script of an FMU sets it."""
     model: ClassVar[Model]
     on_demand: ClassVar[frozenset[int]] = frozenset()
-    """References of the Reals that are worked out when they are asked for."""
+    """References of the Reals that are worked out only when they are asked for."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         model = self.model
         self._by_reference, self._inputs, self._kept = model.by_reference, model.inputs, model.kept
         self._phase = Phase.INSTANTIATED
-        self._reals: dict[int, float] = {}
+        self._given: dict[int, float] = {}  # Reals as they start, or as the host set them
+        self._seen: dict[int, float] = {}  # Reals that are worked out, of the communication point
         self._integers: dict[int, int] = {}
         self._booleans: dict[int, bool] = {}
         for variable in model.variables:
@@ -42,13 +43,14 @@ class Slave(WrappedSlave):
                 self._booleans[variable.reference] = bool(variable.start)
             elif variable.kind != "Real":
                 self._integers[variable.reference] = int(variable.start or 0)
-            elif variable.reference not in self.on_demand:
-                self._reals[variable.reference] = float(variable.start or 0.0)
+            elif variable.start is not None:
+                self._given[variable.reference] = float(variable.start)
         self._time = 0.0
         self._stop_time = math.inf  # with the experiment; the standard forbids to step past it
         self._hosts_tolerance: float | None = None  # with the experiment; it comes before a parameter of that name
         self._tuned = False  # a parameter was set since the last step: the next one takes it up
-        self._stale = True  # the values that are read are not yet those of the communication point
+        self._stale = True  # what is seen is not yet that of the communication point
+        self._all_seen = False  # what is worked out on demand is among it
 
     # ---- life cycle
 
@@ -117,13 +119,13 @@ class Slave(WrappedSlave):
     def get_real(self, vrs: list[int]) -> list[float]:
         try:
             if self._stale:
-                self._observe()
+                self._look()
+            if not self._all_seen and not self.on_demand.isdisjoint(vrs):
+                self._seen |= self._observe_on_demand()
+                self._all_seen = True
+            seen, given = self._seen, self._given
             try:
-                return list(map(self._reals.__getitem__, vrs))
-            except KeyError:
-                self._observe_on_demand()
-            try:
-                return list(map(self._reals.__getitem__, vrs))
+                return [seen[reference] if reference in seen else given[reference] for reference in vrs]
             except KeyError as error:
                 raise _unknown("Real", error.args[0]) from None
         except Exception:
@@ -145,11 +147,11 @@ class Slave(WrappedSlave):
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         try:
             if self._phase is Phase.STEPPING and self._inputs.issuperset(vrs) and math.isfinite(sum(values)):
-                reals = self._reals
+                given = self._given
                 for reference, value in zip(vrs, values):  # noqa: B905 - the wrapper makes both of one length
-                    reals[reference] = value
+                    given[reference] = value
                 return  # inputs come often and have no other rule
-            self._set(self._reals, "Real", vrs, values)
+            self._set(self._given, "Real", vrs, values)
         except Exception:
             self.outlive_exception()
             raise
@@ -176,11 +178,18 @@ class Slave(WrappedSlave):
     def _set(self, table: MutableMapping[int, Number], kind: str, vrs: list[int], values: list[Number]) -> None:
         # all are checked before one is set: a refused call changes nothing
         for reference, value in zip(vrs, values, strict=True):
-            if reference not in table and not (kind == "Real" and reference in self.on_demand):
+            variable = self._by_reference.get(reference)
+            if variable is None or variable.kind not in kind.split(" or "):
                 raise _unknown(kind, reference)
-            self._check_set(self._by_reference[reference], value)
+            self._check_set(variable, value)
         table.update(zip(vrs, values, strict=True))
         self._after_set(vrs)
+
+    def _look(self) -> None:
+        """Bring what is seen up to the communication point."""
+        if not self._started():
+            self._take_up_start_values()
+        self._seen, self._all_seen, self._stale = self._observe(), False, False
 
     def _check_set(self, variable: Variable, value: float) -> None:
         if not may_be_set(variable, self._phase):
@@ -209,7 +218,7 @@ class Slave(WrappedSlave):
             "time": self._time,
             "stop_time": self._stop_time,
             "tolerance": self._hosts_tolerance,
-            "reals": [self._reals[reference] for reference in self._kept],
+            "reals": [self._given[reference] for reference in self._kept],
             "integers": [self._integers[reference] for reference in sorted(self._integers)],
             "booleans": [self._booleans[reference] for reference in sorted(self._booleans)],
             "tuned": self._tuned,
@@ -221,7 +230,7 @@ class Slave(WrappedSlave):
         self._check_build(state)
         self._phase = Phase[state["phase"]]
         self._time, self._stop_time, self._hosts_tolerance = state["time"], state["stop_time"], state["tolerance"]
-        self._reals.update(zip(self._kept, state["reals"], strict=True))
+        self._given.update(zip(self._kept, state["reals"], strict=True))
         self._integers.update(zip(sorted(self._integers), state["integers"], strict=True))
         self._booleans.update(zip(sorted(self._booleans), state["booleans"], strict=True))
         self._tuned = state["tuned"]
@@ -265,15 +274,16 @@ class Slave(WrappedSlave):
         """Go on by a communication step [s], or raise and change nothing."""
         raise NotImplementedError
 
-    def _observe(self) -> None:
-        """Bring the values that are read up to the communication point, and unset `_stale`."""
+    def _observe(self) -> dict[int, float]:
+        """The Reals of the communication point that are worked out, but for those on demand."""
         raise NotImplementedError
 
     def _observe_discrete(self) -> None:
-        """The same for Integers and Booleans, where they are not always there."""
+        """Bring Integers and Booleans up to the communication point, where they are not always there."""
 
-    def _observe_on_demand(self) -> None:
-        """Work out the rest of the Reals, which most hosts never ask for."""
+    def _observe_on_demand(self) -> dict[int, float]:
+        """The rest of the Reals, which most hosts never ask for."""
+        raise NotImplementedError
 
     def _own_state(self) -> dict[str, Any]:
         """What the FMU state has beside inputs, parameters, Integers and Booleans."""

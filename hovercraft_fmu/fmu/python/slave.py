@@ -5,7 +5,7 @@ from typing import Any, NoReturn
 
 from ...model.craft import Craft, check_parameter
 from ...model.dynamics import Controls, State, saturate
-from ...model.integrators import integrator
+from ...model.integrators import Integrator, integrator
 from ...model.observation import observe_action, observe_motion
 from ...model.subcycling import (
     NonFiniteError,
@@ -39,21 +39,21 @@ from .wrapper import Fmi2Status
 THRUST, PORT, STARBOARD, WIND_X, WIND_Y = (BY_NAME[name].reference for name in INPUTS)
 STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
 MOTION_REFERENCES = STATE_REFERENCES + tuple(BY_NAME[name].reference for name in MOTION)
-ACTION_REFERENCES = tuple(BY_NAME[name].reference for name in ACTION + WATCHED)
+ON_DEMAND = (*ACTION, *WATCHED, "projected_area")
+ON_DEMAND_REFERENCES = tuple(BY_NAME[name].reference for name in ON_DEMAND)
 CRAFT_VARIABLES = tuple(BY_NAME[name] for name in CRAFT_PARAMETERS)
 STEP_SIZE = BY_NAME["step_size"].reference
 INTEGRATOR = BY_NAME["integrator"].reference
 SUBSTEPS = BY_NAME["substeps"].reference
 WARNED = BY_NAME["warnings"].reference
 TOLERANCE = BY_NAME["tolerance"].reference
-PROJECTED_AREA = BY_NAME["projected_area"].reference
 
 
 class HovercraftSlave(Slave):
     """The hovercraft behind the FMI functions of pythonfmu's wrapper."""
 
     model = HOVERCRAFT
-    on_demand = frozenset(ACTION_REFERENCES)
+    on_demand = frozenset(ON_DEMAND_REFERENCES)
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -64,13 +64,11 @@ class HovercraftSlave(Slave):
         self._settings = Settings()
         self._proposed = 0.0  # the next step of the adaptive method
         self._stability = self._rotation = 0.0  # the largest of a sub-step so far
-        self._acting = False  # what acts on the craft is among the values that are read
 
     # ---- a step
 
     def _advance(self, step_size: float) -> None:
-        reals = self._reals
-        controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD], reals[WIND_X], reals[WIND_Y])
+        controls = self._make_controls()
         craft = self._make_craft() if self._tuned else self._craft
         try:
             stretch = advance(self._state, controls, craft, step_size, self._settings, proposed=self._proposed)
@@ -89,27 +87,29 @@ class HovercraftSlave(Slave):
         if rotation > self._rotation:
             self._rotation = rotation
         method = self._settings.integrator
-        if stability > method.stability_limit or rotation > method.rotation_limit:
-            self._warn_of_the_step()
+        if stability > method.stability_limit:
+            self._warn_of_stability(stability, method)
+        if rotation > method.rotation_limit:
+            self._warn_of_rotation(rotation, method)
         thrust, port, starboard, _, _ = controls
         if not (craft.thrust_min <= thrust <= craft.thrust_max and 0.0 <= port <= 1.0 and 0.0 <= starboard <= 1.0):
             self._warn_of_held_inputs()
 
-    def _warn_of_the_step(self) -> None:
-        method, step = self._settings.integrator, self._settings.step_size
-        number, rotation = self._stability, self._rotation
-        if number > method.stability_limit:
-            self._warn(
-                STEP_UNSTABLE,
-                f"stability_number = {number:.4g}: must not pass {method.stability_limit} with {method.name}; set a "
-                f"step_size below {step * method.stability_limit / number:.3g} s, or another integrator",
-            )
-        if rotation > method.rotation_limit:
-            self._warn(
-                STEP_TURNS,
-                f"rotation_per_substep = {rotation:.4g} rad: must not pass {method.rotation_limit} rad; set a "
-                f"step_size below {step * method.rotation_limit / rotation:.3g} s, or the integrator adaptive",
-            )
+    def _warn_of_stability(self, number: float, method: Integrator) -> None:
+        step = self._settings.step_size * method.stability_limit / number
+        self._warn(
+            STEP_UNSTABLE,
+            f"stability_number = {number:.4g}: must not pass {method.stability_limit} with {method.name}; set a "
+            f"step_size below {step:.3g} s, or another integrator",
+        )
+
+    def _warn_of_rotation(self, rotation: float, method: Integrator) -> None:
+        step = self._settings.step_size * method.rotation_limit / rotation
+        self._warn(
+            STEP_TURNS,
+            f"rotation_per_substep = {rotation:.4g} rad: must not pass {method.rotation_limit} rad; set a "
+            f"step_size below {step:.3g} s, or the integrator adaptive",
+        )
 
     def _stop_counter(self) -> None:
         self._integers[SUBSTEPS] = SUBSTEPS_MAX
@@ -168,51 +168,44 @@ class HovercraftSlave(Slave):
 
     def _make_craft(self) -> Craft:
         values: dict[str, Any] = {
-            name: self._chosen(name) if variable.enumeration else self._reals[variable.reference]
+            name: self._chosen(name) if variable.enumeration else self._given[variable.reference]
             for name, variable in zip(CRAFT_PARAMETERS, CRAFT_VARIABLES, strict=True)
         }
         return Craft(**values)
 
+    def _make_controls(self) -> Controls:
+        given = self._given
+        return Controls(given[THRUST], given[PORT], given[STARBOARD], given[WIND_X], given[WIND_Y])
+
     def _take_up_settings(self) -> None:
-        tolerance = self._reals[TOLERANCE] if self._hosts_tolerance is None else self._hosts_tolerance
-        self._settings = Settings(self._reals[STEP_SIZE], integrator(self._chosen("integrator")), tolerance)
+        tolerance = self._given[TOLERANCE] if self._hosts_tolerance is None else self._hosts_tolerance
+        self._settings = Settings(self._given[STEP_SIZE], integrator(self._chosen("integrator")), tolerance)
 
     def _take_up_start_values(self) -> None:
-        reals = self._reals
         self._craft = self._make_craft()
         self._take_up_settings()
-        self._controls = Controls(reals[THRUST], reals[PORT], reals[STARBOARD], reals[WIND_X], reals[WIND_Y])
-        self._state = State(*(reals[BY_NAME[name].reference] for name in STATES))
-        reals[PROJECTED_AREA] = self._craft.projected_area
+        self._controls = self._make_controls()
+        self._state = State(*(self._given[reference] for reference in STATE_REFERENCES))
         self._tuned = False
         self._stale = True
 
-    def _observe(self) -> None:
-        if not self._started():
-            self._take_up_start_values()
-        state, reals = self._state, self._reals
-        motion = observe_motion(state)
+    def _observe(self) -> dict[int, float]:
+        motion = observe_motion(self._state)
         if not math.isfinite(motion[-1]):  # the speed overflows first
             refuse_non_finite(MOTION, motion)
-        reals.update(zip(MOTION_REFERENCES, state + motion))  # noqa: B905
-        if self._acting:
-            for reference in ACTION_REFERENCES:
-                del reals[reference]
-            self._acting = False
-        self._stale = False
+        return dict(zip(MOTION_REFERENCES, self._state + motion))  # noqa: B905 - of one length
 
-    def _observe_on_demand(self) -> None:
-        if not self._acting:
-            action = observe_action(self._state, self._controls, self._craft)
-            refuse_non_finite(ACTION, action)
-            self._reals.update(zip(ACTION_REFERENCES, (*action, self._stability, self._rotation), strict=True))
-            self._acting = True
+    def _observe_on_demand(self) -> dict[int, float]:
+        action = observe_action(self._state, self._controls, self._craft)
+        refuse_non_finite(ACTION, action)
+        more = (self._stability, self._rotation, self._craft.projected_area)
+        return dict(zip(ON_DEMAND_REFERENCES, (*action, *more), strict=True))
 
     # ---- FMU state
 
     def _own_state(self) -> dict[str, Any]:
         return {
-            "state": list(self._state if self._started() else (self._reals[r] for r in STATE_REFERENCES)),
+            "state": list(self._state if self._started() else (self._given[r] for r in STATE_REFERENCES)),
             "controls": list(self._controls),
             "craft": [getattr(self._craft, name) for name in CRAFT_PARAMETERS],
             "stability": self._stability,
@@ -222,10 +215,9 @@ class HovercraftSlave(Slave):
 
     def _set_own_state(self, state: dict[str, Any]) -> None:
         self._state = State(*state["state"])
-        self._reals.update(zip(STATE_REFERENCES, self._state, strict=True))
+        self._given.update(zip(STATE_REFERENCES, self._state, strict=True))
         self._controls = Controls(*state["controls"])
         self._craft = Craft(**dict(zip(CRAFT_PARAMETERS, state["craft"], strict=True)))
-        self._reals[PROJECTED_AREA] = self._craft.projected_area
         if self._started():  # else the start values are taken up, and refused, later
             self._take_up_settings()
         self._stability, self._rotation, self._proposed = state["stability"], state["rotation"], state["proposed"]
