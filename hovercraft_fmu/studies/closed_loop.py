@@ -18,6 +18,7 @@ from ..view.palette import INK, METHODS, OTHER, QUIET
 from ..view.plots import new_figure
 from .laboratory import Findings, Shown, Tell, part
 from .reference_end import TOLERANCES
+from .work_precision import fitted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -108,7 +109,7 @@ def courses(steps: Sequence[float], tell: Tell) -> pl.DataFrame:
 def order(found: pl.DataFrame, error_of: str) -> float:
     """The order that is observed: of the error over the communication step, fitted up to 1 s."""
     own = found.filter((pl.col("error_of") == error_of) & (pl.col("communication_step") <= 1.0))
-    return float(np.polyfit(np.log(own["communication_step"]), np.log(own["position_error"]), 1)[0])
+    return fitted(own["communication_step"], own["position_error"])
 
 
 def study(quick: bool, tell: Tell) -> Findings:

@@ -2,9 +2,9 @@
 
 import itertools
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import MappingProxyType
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 import polars as pl
@@ -12,13 +12,64 @@ from numpy.typing import NDArray
 
 from ..model.craft import DIRECTIONAL, Craft
 from ..model.dynamics import Controls, State, actuation, drag_per_speed, friction_gains, friction_radius
-from ..model.integrators import Integrator, StepTooSmallError
-from ..model.subcycling import NonFiniteError, Settings, advance, stability_number
-from .batches import ADAPTIVE, FIXED, Array, Batch, Mask, advanced, chosen, made, single
+from ..model.integrators import INTEGRATORS, Integrate, Integrator, Stretch
+from ..model.subcycling import stability_number
 from .laboratory import Tell
 
+Array: TypeAlias = Any
+"""One number a run, shape (runs,), float64; the model's functions are annotated for one craft and take these, too."""
+Mask: TypeAlias = Any
+"""Shape (runs,), bool."""
+
+FIXED = tuple(method for method in INTEGRATORS if method.integrate)
+"""The methods with a fixed step."""
+ADAPTIVE = next(method for method in INTEGRATORS if not method.integrate)
+
+
+class Batch(NamedTuple):
+    """Runs to be made: every number is an array of shape (runs,)."""
+
+    craft: Craft
+    controls: Controls
+    start: State
+    h: Array
+    """s, the sub-step"""
+    substeps: int
+    """of each run"""
+
+
+def mapped(batch: Batch, function: Callable[[Array], Any]) -> Batch:
+    """The batch with a function applied to every array."""
+    craft: Any = {field.name: function(getattr(batch.craft, field.name)) for field in fields(Craft)}
+    controls, start = Controls(*map(function, batch.controls)), State(*map(function, batch.start))
+    return Batch(Craft(**craft), controls, start, function(batch.h), batch.substeps)
+
+
+def made(craft: Craft, controls: Controls, start: State, h: Array, substeps: int = 1) -> Batch:
+    """A batch in which everything has the shape of h: plain floats serve all runs alike."""
+    return mapped(Batch(craft, controls, start, h, substeps), lambda value: np.broadcast_to(value, h.shape))
+
+
+def chosen(batch: Batch, which: Any) -> Batch:
+    """Some of the runs: a mask, a slice, or indices."""
+    return mapped(batch, lambda value: value[which])
+
+
+def single(batch: Batch, i: int) -> Batch:
+    """One of the runs, in plain numbers."""
+    return mapped(batch, lambda value: value[i].item())
+
+
+def advanced(batch: Batch, method: Integrator, state: State, n: int, refined: int = 1) -> Stretch:
+    """Every craft of the batch n sub-steps after a state, each cut into so many; motions may leave the numbers."""
+    with np.errstate(all="ignore"):
+        integrate = cast(Integrate, method.integrate)
+        return integrate(state, batch.controls, batch.craft, batch.h / refined, n * refined, np)
+
+
+# ---- the numbers of the study
+
 FAILED, WARNED, ACCURATE, SILENT = range(4)
-VERDICTS = ("failed", "warned", "accurate", "silent")
 """A number that is not finite; a limit of the method passed; within the formula; none of these, which must not be."""
 SUBSTEPS = (1, 4, 16, 64)
 """N, in turn from batch to batch."""
@@ -36,11 +87,6 @@ ROUNDING = 1e-11
 # ---- what is drawn
 
 
-def absolute_steps(rng: np.random.Generator, runs: Batch) -> Array:
-    """s: from 1e-5 to 10, whatever the craft."""
-    return _logarithmic(rng, 1e-5, 10.0, len(runs.h))
-
-
 def own_steps(rng: np.random.Generator, runs: Batch) -> Array:
     """s: 1e-5 to 3 times the time in which the craft's motion changes, at most 10 s."""
     thrust, side, turn = actuation(runs.controls, runs.craft, np)
@@ -53,9 +99,10 @@ def own_steps(rng: np.random.Generator, runs: Batch) -> Array:
 
 
 WITH_TERMS = "the same, with every term"
-SAMPLINGS: Mapping[str, Callable[[np.random.Generator, Batch], Array]] = MappingProxyType(
-    {"steps 1e-5 to 10 s": absolute_steps, "steps to the craft's own time": own_steps, WITH_TERMS: own_steps}
-)
+SAMPLINGS: Mapping[str, Callable[[np.random.Generator, Batch], Array]] = MappingProxyType({
+    "steps 1e-5 to 10 s": lambda rng, runs: _logarithmic(rng, 1e-5, 10.0, len(runs.h)),
+    "steps to the craft's own time": own_steps, WITH_TERMS: own_steps,
+})  # fmt: skip
 
 
 def _logarithmic(rng: np.random.Generator, low: float, high: float, count: int) -> Array:
@@ -252,7 +299,7 @@ def _difference(a: State, b: State, craft: Craft) -> Array:
         return _size(a.vx - b.vx, a.vy - b.vy, a.yaw_rate - b.yaw_rate, craft)
 
 
-METHOD = pl.Enum([*(method.name for method in FIXED), ADAPTIVE.name])
+METHOD = pl.Enum([method.name for method in FIXED])
 SAMPLING = pl.Enum(list(SAMPLINGS))
 
 
@@ -265,51 +312,10 @@ def measure_extremes(runs: int = 65536, seed: int = 1, size: int = BATCH, tell: 
         for name, judged in judge(sample(rng, size, substeps, sampling)).items():
             columns = {"sigma": judged.numbers.sigma, "rho": judged.numbers.rho, "error": judged.error}
             columns |= {"bound": judged.bound, "doubt": judged.doubt, "verdict": judged.verdict}
-            frames.append(_labelled(columns, name, sampling, np.full(size, substeps)))
+            labels = pl.lit(name, METHOD).alias("method"), pl.lit(sampling, SAMPLING).alias("sampling")
+            frames.append(pl.DataFrame(columns).with_columns(*labels, pl.lit(substeps).alias("substeps")))
         tell((i + 1) / batches)
-    return pl.concat(frames)
-
-
-def _labelled(columns: Mapping[str, Array], method: str, sampling: str, substeps: Array) -> pl.DataFrame:
-    labels = pl.lit(method, METHOD).alias("method"), pl.lit(sampling, SAMPLING).alias("sampling")
-    rows = pl.DataFrame({**columns, "substeps": substeps})
-    return rows.with_columns(*labels, pl.col("error", "doubt").fill_nan(None))
-
-
-TOLERANCE = 1e-5
-OWN_TIMES = 4
-"""Times the sampled step: how long a run of the adaptive method lasts."""
-
-
-def measure_adaptive(runs: int = 1000, seed: int = 5) -> pl.DataFrame:
-    """Random extremes with the adaptive method, against itself at a tolerance a thousand times as sharp.
-
-    Without terms: friction on a craft that is hard to move and easy to turn asks for steps of nanoseconds.
-    """
-    sampling = list(SAMPLINGS)[1]
-    drawn = sample(np.random.default_rng(seed), runs, OWN_TIMES, sampling)
-    error, bound, doubt, verdict, substeps = zip(*(_adaptive_run(drawn, i) for i in range(runs)), strict=True)
-    nothing = np.full(runs, np.nan)
-    columns = {"sigma": nothing, "rho": nothing, "error": error, "bound": bound, "doubt": doubt}
-    return _labelled({**columns, "verdict": np.array(verdict, np.int8)}, ADAPTIVE.name, sampling, np.array(substeps))
-
-
-def _adaptive_run(runs: Batch, i: int) -> tuple[float, float, float, int, int]:
-    """Error and bound [1, of V], the sharper run's bound in units of this, the verdict, steps."""
-    craft, controls, start, first, _ = single(runs, i)
-    try:
-        coarse, fine = (
-            advance(start, controls, craft, OWN_TIMES * first, Settings(first, ADAPTIVE, tolerance))
-            for tolerance in (TOLERANCE, 1e-3 * TOLERANCE)
-        )
-    except (StepTooSmallError, NonFiniteError):
-        return np.nan, np.nan, np.nan, FAILED, 0
-    speed = max(float(_size(each.vx, each.vy, each.yaw_rate, craft)) for each in (start, fine.state))
-    scale = speed if speed > 0.0 else 1.0
-    error = float(_difference(coarse.state, fine.state, craft)) / scale
-    bound = 10.0 * coarse.substeps * TOLERANCE * max(1.0, speed) / scale
-    doubt = 1e-3 * fine.substeps / coarse.substeps * bound
-    return error, bound, doubt, ACCURATE if error <= bound else SILENT, coarse.substeps
+    return pl.concat(frames).with_columns(pl.col("error", "doubt").fill_nan(None))
 
 
 def shares(extremes: pl.DataFrame) -> pl.DataFrame:

@@ -26,7 +26,6 @@ Tell: TypeAlias = Callable[[float], None]
 """Called with the part of the work that is done, 0 to 1."""
 Ready: TypeAlias = Callable[[], Callable[[], Found]]
 """A case: makes everything ready, and returns what is then timed."""
-MACHINE = "machine.txt"
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ class Findings:
                 (folder / f"{shown.name}.md").write_text(text(shown.frame) + "\n", encoding="utf-8")
         for name, figure in self.pictures.items():
             figure.savefig(folder / f"{name}.png", format="png", metadata={"Software": None})
-        (folder / MACHINE).write_text(machine() + "\n", encoding="utf-8")
+        (folder / "machine.txt").write_text(machine() + "\n", encoding="utf-8")
 
     def report(self) -> str:
         """What is printed: the tables, the notes, the machine."""

@@ -46,15 +46,11 @@ class ControlRamp(NamedTuple):
         passed = time - self.begin
         return Controls(*(value + passed * rate for value, rate in zip(self.start, self.rates, strict=True)))
 
-    def points(self) -> Iterator[float]:
+    def points(self) -> list[float]:
         """s: where the outputs are read."""
         first = math.floor(self.begin / COMMUNICATION_STEP) + 1
-        for k in itertools.count(first):
-            time = k * COMMUNICATION_STEP
-            if time >= self.end - 1e-9:
-                break
-            yield time
-        yield self.end
+        last = math.ceil(self.end / COMMUNICATION_STEP - 1e-9)
+        return [*(k * COMMUNICATION_STEP for k in range(first, last)), self.end]
 
 
 def ramps(scene: Scene) -> Iterator[ControlRamp]:
@@ -191,7 +187,8 @@ def exchanged(stepping: Instance, solving: Instance, scenes: Sequence[Scene], ro
     found = pl.DataFrame(rows)
     best = choices(found)
     title = "The cheapest way to a position error through fmpy: the FMU's own method, and CVode in model exchange"
-    slopes = ", ".join(f"{scene.name} {slope(found, scene.name):.2f}" for scene in scenes)
+    cvode = found.filter(solver=CVODE).partition_by("scene", maintain_order=True)
+    slopes = ", ".join(f"{own['scene'][0]} {fitted(own['tolerance'], own['error']):.2f}" for own in cvode)
     return Findings(
         {"exchange_runs": found, "exchange": best},
         [Shown(title, best)],
@@ -215,9 +212,3 @@ def choices(found: pl.DataFrame) -> pl.DataFrame:
                 "cvode_over_own": b["cost"] / a["cost"], "evaluations_over_own": b["evaluations"] / a["evaluations"],
             })  # fmt: skip
     return pl.DataFrame(rows)
-
-
-def slope(found: pl.DataFrame, scene: str) -> float:
-    """Of the largest error at the end over CVode's tolerance, log-log: 1 where it is proportional."""
-    own = found.filter(scene=scene, solver=CVODE)
-    return fitted(own["tolerance"], own["error"])

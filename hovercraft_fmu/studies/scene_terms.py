@@ -14,7 +14,7 @@ from ..model.dynamics import State
 from ..model.subcycling import advance
 from ..scenes import SCENES, Scene
 from ..simulation import Value, plan, schedule
-from ..view.palette import QUIET, SEA
+from ..view.palette import INK, SHADES
 from ..view.plots import new_figure
 from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread
 
@@ -148,27 +148,17 @@ def _length(metres: float) -> str:
 
 
 def draw(found: pl.DataFrame) -> "Figure":
-    """Term by scene: the difference in the end position as colour and number; beside it, the price."""
+    """Term, with its price, by scene: the difference in the end position as colour and number."""
     moved = found.pivot("scene", index="term", values="position_difference")
-    terms, scenes = list(moved["term"]), moved.columns[1:]
-    figure = new_figure(figsize=(13.0, 4.6), dpi=110, layout="constrained")
-    map_axes, bar_axes = figure.subplots(1, 2, width_ratios=(4.0, 1.0), sharey=True)
-    lengths = moved.drop("term").to_numpy()
-    grid = np.log10(np.maximum(lengths, 1e-6))
-    image = map_axes.imshow(grid, cmap="Greys", vmin=-6.0, vmax=6.0, aspect="auto")
+    scenes, lengths = moved.columns[1:], moved.drop("term").to_numpy()
+    figure = new_figure(figsize=(10.5, 4.2), dpi=110, layout="constrained")
+    axes, grid = figure.add_subplot(), np.log10(np.maximum(lengths, 1e-6))
+    image = axes.imshow(grid, cmap=f"{SHADES}_r", vmin=-6.0, vmax=3.0, aspect="auto")
     for (i, j), metres in np.ndenumerate(lengths):
-        map_axes.text(j, i, _length(metres), ha="center", va="center", fontsize="small",
-                      color="white" if grid[i, j] > 1.5 else "black")  # fmt: skip
-    map_axes.set_xticks(range(len(scenes)), scenes)
-    map_axes.set_yticks(range(len(terms)), terms)
-    map_axes.set_title("How far the end of the scene moves", loc="left")
-    figure.colorbar(image, ax=map_axes, label="log10 of it [m]", pad=0.01)
-    costs = list(prices(found).values())
-    bar_axes.barh(range(len(terms)), costs, color=SEA)
-    for i, cost in enumerate(costs):
-        bar_axes.text(cost, i, f" {cost:.2f} x", va="center", fontsize="small")
-    bar_axes.axvline(1.0, color=QUIET, linewidth=1.0)
-    bar_axes.set_xlim(0.0, 1.25 * max(costs))
-    bar_axes.set_title("Cost, to the default", loc="left")
-    bar_axes.spines[["top", "right"]].set_visible(False)
+        color = "white" if grid[i, j] > -1.0 else INK
+        axes.text(j, i, _length(metres), ha="center", va="center", fontsize="small", color=color)
+    axes.set_xticks(range(len(scenes)), scenes)
+    axes.set_yticks(range(len(moved)), [f"{term}: {cost:.2f} x the cost" for term, cost in prices(found).items()])
+    axes.set_title("How far the end of the scene moves", loc="left")
+    figure.colorbar(image, ax=axes, label="log10 of it [m]", pad=0.01)
     return figure

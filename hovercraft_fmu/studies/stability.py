@@ -59,10 +59,9 @@ import polars as pl
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State
 from ..model.integrators import Integrator
-from ..view.palette import FAINT_LINE, INK, METHODS, QUIET, SHADES
+from ..view.palette import INK, METHODS, QUIET
 from ..view.plots import new_figure
-from .batches import FIXED, Array, Batch, Mask, advanced, chosen, made
-from .extremes import ACCURATE, BATCH, WARNED, measure_adaptive, measure_extremes, shares
+from .extremes import BATCH, FIXED, Array, Batch, Mask, advanced, chosen, made, measure_extremes, shares
 from .laboratory import Findings, Shown, Tell, part
 
 if TYPE_CHECKING:
@@ -196,30 +195,22 @@ def largest_step(motion: Motion, method: Integrator, quality: str) -> Array:
     return np.where(right.all(axis=1), np.inf, 0.5 * (x[craft, failed - 1] + x[craft, failed]))
 
 
-THEORY: Mapping[tuple[str, str], tuple[float, float, float]] = MappingProxyType(
-    {
-        ("semi_implicit_euler", "coasting"): (1.0, 2.0, 2.0),
-        ("semi_implicit_euler", "thrust"): (0.5, 1.0, 1.4659),
-        ("drag_implicit", "coasting"): (np.inf, np.inf, np.inf),
-        ("drag_implicit", "thrust"): (1.0, np.inf, np.inf),
-        ("rk4", "coasting"): (2.4552, 2.4552, 2.4552),
-        # half the root of z^3/24 - z^2/6 + z/2 = 1
-        ("rk4", "thrust"): (1.3926, 1.3926, np.nan),
-    }
-)
-"""Monotone, stable, bounded up to these dimensionless steps; a spin as coasting; NaN: no theory."""
-
-
-def theory(method: Integrator, motion: str) -> tuple[float, float, float]:
-    """The limits that the docstring of the module derives."""
-    return THEORY[method.name, "coasting" if motion == "spin" else motion]
+ANY = (np.inf, np.inf, np.inf)
+THEORY: Mapping[tuple[str, str], tuple[float, float, float]] = MappingProxyType({
+    **{("semi_implicit_euler", motion): (1.0, 2.0, 2.0) for motion in ("coasting", "spin")},
+    **{("drag_implicit", motion): ANY for motion in ("coasting", "spin")},
+    **{("rk4", motion): (2.4552, 2.4552, 2.4552) for motion in ("coasting", "spin")},
+    ("semi_implicit_euler", "thrust"): (0.5, 1.0, 1.4659), ("drag_implicit", "thrust"): (1.0, np.inf, np.inf),
+    ("rk4", "thrust"): (1.3926, 1.3926, np.nan),  # half the root of z^3/24 - z^2/6 + z/2 = 1
+})  # fmt: skip
+"""Monotone, stable, bounded up to these dimensionless steps, as derived above; NaN: no theory."""
 
 
 def measure_map(all_motions: Sequence[Motion], tell: Tell) -> pl.DataFrame:
     """All limits of all methods: the smallest and the largest dimensionless step over the craft, and the theory's."""
     rows, pairs = [], list(itertools.product(FIXED, all_motions))
     for done, (method, motion) in enumerate(pairs, 1):
-        for quality, expected in zip(QUALITIES, theory(method, motion.name), strict=True):
+        for quality, expected in zip(QUALITIES, THEORY[method.name, motion.name], strict=True):
             x = largest_step(motion, method, quality)
             rows.append((method.name, motion.name, quality, float(x.min()), float(x.max()), expected))
         tell(done / len(pairs))
@@ -236,47 +227,19 @@ def study(quick: bool, tell: Tell) -> Findings:
         whole = tuple(motion._replace(crafts=chosen(motion.crafts, slice(0, 2))) for motion in whole[:2])
     limits = measure_map(whole, part(tell, 0.0, 0.5))
     runs, size = (1024, 256) if quick else (65536, BATCH)
-    extremes = measure_extremes(runs, size=size, tell=part(tell, 0.5, 0.95))
-    rows = shares(pl.concat([extremes, measure_adaptive(100 if quick else 1000)]))
-    figure = new_figure(figsize=(13.0, 4.6), dpi=75, layout="constrained")
+    extremes = measure_extremes(runs, size=size, tell=part(tell, 0.5, 1.0))
+    rows = shares(extremes)
+    figure = new_figure(figsize=(10.0, 4.6), dpi=75, layout="constrained")
     draw(figure, extremes)
-    tell(1.0)
-    return Findings(
-        {"stability": limits, "extremes": rows},
-        [
-            Shown("The largest dimensionless step (h*kappa*v0 coasting, h*kappa*v_t under thrust)", _map(limits)),
-            Shown("Random extremes; shares of the runs", rows),
-        ],
-        {"stability": figure},
-    )
+    title = "The largest dimensionless step (h*kappa*v0 coasting, h*kappa*v_t under thrust)"
+    tables = [Shown(title, limits), Shown("Random extremes; shares of the runs", rows)]
+    return Findings({"stability": limits, "extremes": rows}, tables, {"stability": figure})
 
 
-def _map(limits: pl.DataFrame) -> pl.DataFrame:
-    """A row a method and motion: measured over the craft, and the theory's in brackets; half the stability number."""
-    three = pl.struct("smallest", "largest", "theory").map_elements(_range, pl.String)
-    return limits.with_columns(limit=three).pivot("quality", index=["method", "case"], values="limit")
-
-
-def _range(row: Mapping[str, float]) -> str:
-    smallest, largest, expected = map(_number, row.values())
-    return f"{' ... '.join(dict.fromkeys((smallest, largest)))} ({expected})"
-
-
-def _number(value: float) -> str:
-    return "any step" if value == np.inf else "-" if np.isnan(value) else f"{value:.4g}"
-
-
-SIGMA, RHO = "stability number  $\\sigma$", "rotation in a sub-step  $\\rho$  [rad]"
-NOTES: Mapping[tuple[float, float], str] = MappingProxyType(
-    {
-        (0.3, 1.06): "all three right",
-        (0.62, 1.3): "false cycle",
-        (1.57, -0.62): "diverges",
-        (1.43, 0.72): "false speed",
-        (1.62, 1.06): "the right answer",
-        (2.09, -0.62): "diverges",
-    }
-)
+NOTES = (
+    ("all three right", (0.3, 1.06)), ("false cycle", (0.62, 1.3)), ("diverges", (1.57, -0.62)),
+    ("false speed", (1.43, 0.72)), ("the right answer", (1.62, 1.06)), ("diverges", (2.09, -0.62)),
+)  # fmt: skip
 """What is seen where, in the first panel."""
 DRAWN = ("semi_implicit_euler", "rk4", "drag_implicit")
 DOTS = 4000
@@ -284,12 +247,11 @@ DOTS = 4000
 
 
 def draw(figure: "Figure", extremes: pl.DataFrame) -> None:
-    """Three panels: where the methods settle, the map of the extremes, the errors under their bound."""
-    settled, plane, errors = figure.subplots(1, 3)
+    """Where the methods settle; and the errors of the extremes under their bound."""
+    settled, errors = figure.subplots(1, 2)
     _draw_settled(settled)
-    figure.colorbar(_draw_plane(plane, extremes), ax=plane, label="log10(error / V)", pad=0.02)
     _draw_errors(errors, extremes)
-    for axes in (settled, plane, errors):
+    for axes in (settled, errors):
         axes.spines[["top", "right"]].set_visible(False)
 
 
@@ -303,30 +265,12 @@ def _draw_settled(axes: "Axes") -> None:
         for speed in itertools.islice(textbook.speeds(method, x, 0.0, [960, *[1] * 40]), 1, None):
             axes.plot(x[0], speed[0], ".", color=style.color, markersize=1.0, markeredgewidth=0.0)
         axes.plot([], [], style.marker, color=style.color, markersize=4, label=name)
-    for place, words in NOTES.items():
+    for words, place in NOTES:
         axes.annotate(words, place, fontsize="small", color=QUIET)
     axes.set(xlim=(0.0, 2.4), ylim=(-1.0, 2.4), xlabel="dimensionless step  $h\\,\\kappa\\,v_t$",
              ylabel="speed / terminal speed")  # fmt: skip
     axes.set_title("Where a launch under thrust settles", loc="left")
     axes.legend(loc="upper left", frameon=False)
-
-
-def _draw_plane(axes: "Axes", extremes: pl.DataFrame) -> Any:
-    """Semi-implicit Euler: sigma and rho of each run, the error as colour; grey: warned, so nothing is promised."""
-    method, low, high = FIXED[0], 1e-6, 1e4
-    inside = pl.col("sigma").is_between(low, high) & pl.col("rho").is_between(low, high)
-    runs = _some(extremes.filter((pl.col("method") == method.name) & inside), 3 * DOTS)
-    warned, right = (runs.filter(chosen) for chosen in (pl.col("verdict") <= WARNED, pl.col("verdict") >= ACCURATE))
-    axes.scatter(warned["sigma"], warned["rho"], s=3, color=FAINT_LINE, linewidths=0)
-    colors = np.log10(np.clip(right["error"].to_numpy(), 1e-9, 1.0))
-    dots = axes.scatter(right["sigma"], right["rho"], s=4, c=colors, cmap=f"{SHADES}_r", vmin=-9.0, vmax=0.0,
-                        linewidths=0)  # fmt: skip
-    axes.axvline(method.stability_limit, color=METHODS[method.name].color, linewidth=1.2)
-    axes.axhline(method.rotation_limit, color=METHODS[method.name].color, linewidth=1.2)
-    axes.text(0.03, 0.97, "grey: warned or failed", transform=axes.transAxes, va="top", backgroundcolor="white")
-    axes.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high), xlabel=SIGMA, ylabel=RHO)
-    axes.set_title(f"Random extremes, {method.name}", loc="left")
-    return dots
 
 
 def _draw_errors(axes: "Axes", extremes: pl.DataFrame) -> None:

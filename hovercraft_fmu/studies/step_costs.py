@@ -17,6 +17,7 @@ from ..fmu.machine_code import sources
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..host import Fmu, Instance
+from ..host.messages import WARNING
 from ..hosts import COMPILERS, compiler
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State, actuation
@@ -39,7 +40,6 @@ DRIVEN = INPUTS[:3]
 SOURCE = Path(__file__).parent / "step_costs.c"
 OPTIONS = ("-std=gnu11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC")
 OURS, PYTHON, BARE, PLAIN = "native FMU", "Python FMU", "bare model, in Python", "plain C loop with libm, -O3"
-WARNING = 1
 Cases: TypeAlias = Iterator[tuple[tuple[str, str], Ready[int]]]
 """(what, whose) -> what returns how many of it were made."""
 
@@ -155,14 +155,10 @@ def evaluation_case(solving: Instance, loops: Loops) -> Cases:
     yield ("C host: set time and states, get derivatives", OURS), _started(solving, go, {})
 
 
-def load_cases(name: str, path: Path) -> Cases:
+def load(path: Path) -> int:
     """A file opened, one instance, and both closed."""
-
-    def load() -> int:
-        with Fmu(path) as fmu, fmu.instance():
-            return 1
-
-    yield ("fmpy: extract, load, instantiate, free", name), lambda: load
+    with Fmu(path) as fmu, fmu.instance():
+        return 1
 
 
 # ---- the study
@@ -183,7 +179,8 @@ def study(quick: bool, tell: Tell) -> Findings:
             native.instance(exchange=True) as solving,
         ):  # fmt: skip
             cases = [*substep_cases(one, loops), *call_cases(OURS, one, loops), *call_cases(PYTHON, other, loops)]
-            cases += [*load_cases(OURS, paths[0]), *load_cases(PYTHON, paths[1])]
+            for whose, path in zip((OURS, PYTHON), paths, strict=True):
+                cases.append((("fmpy: extract, load, instantiate, free", whose), partial(partial, load, path)))
             cases += evaluation_case(solving, loops) if loops else []
             timed = interleaved(dict(cases), 5 if quick else ROUNDS, tell)
     found = compared(timed)

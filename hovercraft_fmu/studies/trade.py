@@ -21,7 +21,7 @@ def study(quick: bool, tell: Tell) -> Findings:
     with tempfile.TemporaryDirectory() as folder:
         with Fmu(build_fmu(Path(folder) / "Python.fmu")) as fmu, fmu.instance() as instance:
             found = measured(instance, scenes, rounds, part(tell, 0.0, 0.6))
-        found.add(advice(found.records["work_precision"], quick))
+        found.add(advice(found.records["work_precision"]))
         found.add(accuracy(quick))
         tell(0.7)
         if missing := library(NATIVE).missing:

@@ -188,18 +188,21 @@ ADVICE = {
 """Column -> title."""
 
 
-def advice(found: pl.DataFrame, quick: bool) -> Findings:
+def advice(found: pl.DataFrame) -> Findings:
     """For each accuracy the cheapest triple of integrator, step size and communication step on the scene `turn`.
 
-    Beside the default at the same communication step, and the coarsest sub-step of its method that meets the accuracy.
+    Beside the default at the longest communication step, and the coarsest sub-step of its method that meets the
+    accuracy: from its finest one, by the law of first order.
     """
     own = found.filter(scene=ADVISED_SCENE).sort("fmu_cost")
-    default = own.filter(integrator=EULER, step_size=0.001, communication_step=0.5).row(0, named=True)
+    euler_rows = own.filter(integrator=EULER, communication_step=0.5).sort("step_size")
+    finest, default = (euler_rows.row(i, named=True) for i in map(EULER_STEPS.index, (0.0002, 0.001)))
     records = []
     for accuracy in ACCURACIES:
         row = own.filter(pl.col("position_error") <= accuracy).row(0, named=True)
-        step, cost = (math.nan, math.nan) if quick and accuracy < 1e-4 else coarsest_euler(own, accuracy)
         ratios = {f"default_over_this_{way}": default[f"{way}_cost"] / row[f"{way}_cost"] for way in ("bare", "fmu")}
+        step = min(0.5, finest["step_size"] * accuracy / finest["position_error"])
+        cost = finest["bare_cost"] * finest["step_size"] / step
         euler = {"euler_step": step, "euler_over_this_bare": cost / row["bare_cost"]}
         records.append({"accuracy_m": accuracy, **row, **ratios, **euler})
     found = pl.DataFrame(records)
@@ -207,21 +210,6 @@ def advice(found: pl.DataFrame, quick: bool) -> Findings:
     shown = found.with_columns(integrator=pl.Series(labels)).select(**{title: name for name, title in ADVICE.items()})
     title = f"The cheapest way to an accuracy at the end of {STOP_TIME:g} s, scene {ADVISED_SCENE}"
     return Findings({"advice": found}, [Shown(title, shown, "advice")])
-
-
-def coarsest_euler(own: pl.DataFrame, accuracy: float) -> tuple[float, float]:
-    """Sub-step [s] and bare cost [us a simulated second]: from the first-order law, then run to see that it is met."""
-    finest = own.filter(integrator=EULER, communication_step=0.5).sort("step_size").row(0, named=True)
-    step = min(0.5, finest["step_size"] * accuracy / finest["position_error"])
-    scene = SCENES[ADVISED_SCENE]
-    exact, _ = reference_end(scene, STOP_TIME)
-    while True:
-        step = 0.5 / math.ceil(0.5 / step)  # a whole number of them fits the communication step
-        run = planned(scene, Setting(EULER, step, 0.5))
-        (timed,) = interleaved({step: bare(run, list(schedule(run)))}, 1, lambda _: None).values()
-        if math.dist(timed.found.end[:2], exact[:2]) <= accuracy:
-            return step, timed.least * 1e6 / STOP_TIME
-        step *= 0.9
 
 
 def reached(scene: Scene, setting: Setting) -> Reached:
@@ -303,7 +291,7 @@ def draw_work_precision(found: pl.DataFrame) -> "Figure":
     scenes = longest.partition_by("scene", maintain_order=True)
     columns = min(3, len(scenes))
     lines = -(-len(scenes) // columns)
-    figure = new_figure(figsize=(3.6 * columns + 0.6, 3.4 * lines + 0.9), dpi=110, layout="constrained")
+    figure = new_figure(figsize=(max(3.6 * columns, 7.2) + 0.6, 3.4 * lines + 0.9), dpi=110, layout="constrained")
     grid = figure.subplots(lines, columns, squeeze=False)
     for axes, scene in zip(grid.flat, scenes, strict=False):
         for (name, (color, marker)), (way, line) in itertools.product(METHODS.items(), (("bare", "-"), ("fmu", ":"))):
