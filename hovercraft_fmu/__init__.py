@@ -4,6 +4,7 @@ from ._version import __version__
 from .building import build
 from .fmu.python_package import build_fmu
 from .host import SimulationError
+from .host.fleet import Crafts, advance_fleet
 from .simulation import Result, simulate
 
-__all__ = ["Result", "SimulationError", "__version__", "build", "build_fmu", "simulate"]
+__all__ = ["Crafts", "Result", "SimulationError", "__version__", "advance_fleet", "build", "build_fmu", "simulate"]

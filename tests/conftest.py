@@ -11,11 +11,13 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-from hovercraft_fmu import build_fmu
+from hovercraft_fmu import advance_fleet, build_fmu
 from hovercraft_fmu.autopilot.pilot_package import build_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all
 from hovercraft_fmu.fmu.native_package import build_native_fmu
+from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.dynamics import Controls, State
 from tests.lowlevel import one
 from tests.shell import Shell
 
@@ -73,6 +75,22 @@ def _compiled(flavour: Flavour, name: str, built: Built, platforms: Iterable[str
 def native_fmu(built: Built) -> Path:
     """The native FMU, FMI 2.0, for this machine alone."""
     return _native(NATIVE, "NATIVE_FMU", built)
+
+
+@pytest.fixture(scope="session")
+def fleet(built: Built) -> None:
+    """The compiled library of many craft, of this machine."""
+
+    def make(path: Path) -> Path:
+        compile_all(HERE[sys.platform])
+        path.touch()
+        return path
+
+    built("fleet", make)
+    try:
+        advance_fleet(State(), Controls(), Craft(), 0.1)
+    except NotCompiledError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="session")

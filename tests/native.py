@@ -19,6 +19,7 @@ from hovercraft_fmu.model.integrators import INTEGRATORS, Stretch
 from hovercraft_fmu.model.subcycling import Settings
 
 C_TESTS = Path(__file__).parent / "c"
+KERNEL_FILES = tuple(C_FOLDER / f"{name}.c" for name in ("kernel", "trig", "logarithm"))
 C_INCLUDES = ("-I", str(Path(hosts.__file__).parent))
 """Of the calls of both standards."""
 OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")

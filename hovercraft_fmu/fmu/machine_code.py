@@ -105,12 +105,19 @@ class Library:
 
 def libraries() -> list[Library]:
     """All that are compiled."""
-    return [library(NATIVE), library(NATIVE3)]
+    return [library(NATIVE), library(NATIVE3), fleet_library()]
 
 
 def library(flavour: Flavour) -> Library:
     """Of a native FMU."""
     return Library(flavour.identifier, flavour.sources, sources(identity(flavour), flavour))
+
+
+def fleet_library() -> Library:
+    """Of many craft at once: host/fleet.py loads it."""
+    kernel = [C_FOLDER / f"{name}.{suffix}" for name in ("kernel", "logarithm", "memory", "trig") for suffix in "ch"]
+    files = {file.name: file.read_bytes() for file in (*kernel, *sorted((C_FOLDER / "fleet").iterdir()))}
+    return Library("HovercraftFleet", ("fleet.c", "memory.c"), files)
 
 
 def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:

@@ -68,7 +68,7 @@ def substeps(communication_step: float, step_size: float) -> tuple[int, float]:
     check_step_size(step_size)
     ratio = communication_step / step_size
     if ratio > MAX_SUBSTEPS + 1:
-        raise _too_many(communication_step, step_size)
+        raise too_many_substeps(communication_step, step_size)
     whole = round(ratio) or 1
     if abs(whole * step_size - communication_step) <= WHOLE * communication_step:
         n, h = whole, step_size
@@ -76,11 +76,12 @@ def substeps(communication_step: float, step_size: float) -> tuple[int, float]:
         n = math.ceil(ratio) or 1
         h = communication_step / n
     if n > MAX_SUBSTEPS:
-        raise _too_many(communication_step, step_size)
+        raise too_many_substeps(communication_step, step_size)
     return n, h
 
 
-def _too_many(communication_step: float, step_size: float) -> ValueError:
+def too_many_substeps(communication_step: float, step_size: float) -> ValueError:
+    """What is raised then."""
     return ValueError(
         f"communication step = {communication_step!r} s: must not need more than 10^9 sub-steps of "
         f"step_size = {step_size!r} s"

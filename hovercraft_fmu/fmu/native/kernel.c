@@ -774,6 +774,14 @@ static bool is_finite(const struct state *s)
            isfinite(s->yaw_rate);
 }
 
+/* Of a fixed step. */
+static enum outcome checked(struct stretch *stretch)
+{
+    if (isinf(stretch->state.heading)) /* its sine is no number; in Python it raises, and nothing is left */
+        stretch->state = (struct state){NAN, NAN, NAN, NAN, NAN, NAN};
+    return is_finite(&stretch->state) ? ADVANCED : NOT_FINITE;
+}
+
 enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
                      double communication_step, const struct settings *settings, double proposed,
                      struct stretch *stretch)
@@ -794,9 +802,7 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
         struct load_function f = load_function(drive, craft, h / craft->mass, h / craft->inertia);
         *stretch = semi_implicit_euler(state, &f, h, n);
     }
-    if (isinf(stretch->state.heading)) /* its sine is no number; in Python it raises, and nothing is left */
-        stretch->state = (struct state){NAN, NAN, NAN, NAN, NAN, NAN};
-    return is_finite(&stretch->state) ? ADVANCED : NOT_FINITE;
+    return checked(stretch);
 }
 
 double kernel_stability_number(double drag, double rotation, const struct craft *craft)

@@ -47,27 +47,35 @@ static const double TRIG_LARGE = 0x1.921fbp+20;            /* 2^20*pi/2, above i
 static const double TRIG_TO_INTEGER = 0x1.8p52;            /* adding and subtracting it rounds to an integer */
 static const double TRIG_INVPIO2 = 6.36619772367581382433e-01; /* 0x3FE45F30, 0x6DC9C883: 53 bits of 2/pi */
 
-/* Of n quarter turns and y + tail, where y is in [-pi/4, pi/4]. */
+static const double TRIG_S1 = -1.66666666666666324348e-01, /* 0xBFC55555, 0x55555549 */
+    TRIG_S2 = 8.33333333332248946124e-03,                  /* 0x3F811111, 0x1110F8A6 */
+    TRIG_S3 = -1.98412698298579493134e-04,                 /* 0xBF2A01A0, 0x19C161D5 */
+    TRIG_S4 = 2.75573137070700676789e-06,                  /* 0x3EC71DE3, 0x57B1FE7D */
+    TRIG_S5 = -2.50507602534068634195e-08,                 /* 0xBE5AE5E6, 0x8A2B9CEB */
+    TRIG_S6 = 1.58969099521155010221e-10,                  /* 0x3DE5D93A, 0x5ACFD57C */
+    TRIG_C1 = 4.16666666666666019037e-02,                  /* 0x3FA55555, 0x5555554C */
+    TRIG_C2 = -1.38888888888741095749e-03,                 /* 0xBF56C16C, 0x16C15177 */
+    TRIG_C3 = 2.48015872894767294178e-05,                  /* 0x3EFA01A0, 0x19CB1590 */
+    TRIG_C4 = -2.75573143513906633035e-07,                 /* 0xBE927E4F, 0x809C52AD */
+    TRIG_C5 = 2.08757232129817482790e-09,                  /* 0x3E21EE9E, 0xBDB4B1C4 */
+    TRIG_C6 = -1.13596475577881948265e-11;                 /* 0xBDA8FAE9, 0xBE8838D4 */
+
+/* Sine and cosine of y + tail, where y is in [-pi/4, pi/4]; `real` is double, or some of them side by side. */
+#define TRIG_POLYNOMIALS(real, y, tail, sine, cosine)                                                                  \
+    do {                                                                                                               \
+        const real z = y * y, w = z * z, ww = w * w;                                                                   \
+        const real odd = (TRIG_S1 + z * TRIG_S2) + w * (TRIG_S3 + z * TRIG_S4) + ww * (TRIG_S5 + z * TRIG_S6);         \
+        const real even = w * (TRIG_C1 + z * TRIG_C2) + ww * ((TRIG_C3 + z * TRIG_C4) + w * (TRIG_C5 + z * TRIG_C6));  \
+        const real half = 0.5 * z, one = 1.0 - half;                                                                   \
+        sine = y + (z * y * odd + (tail - z * (0.5 * tail)));                                                          \
+        cosine = one + ((((1.0 - one) - half) - y * tail) + even);                                                     \
+    } while (0)
+
+/* Of n quarter turns and y + tail. */
 static inline struct trig_pair trig_of_rest(int n, double y, double tail)
 {
-    static const double S1 = -1.66666666666666324348e-01, /* 0xBFC55555, 0x55555549 */
-        S2 = 8.33333333332248946124e-03,                  /* 0x3F811111, 0x1110F8A6 */
-        S3 = -1.98412698298579493134e-04,                 /* 0xBF2A01A0, 0x19C161D5 */
-        S4 = 2.75573137070700676789e-06,                  /* 0x3EC71DE3, 0x57B1FE7D */
-        S5 = -2.50507602534068634195e-08,                 /* 0xBE5AE5E6, 0x8A2B9CEB */
-        S6 = 1.58969099521155010221e-10;                  /* 0x3DE5D93A, 0x5ACFD57C */
-    static const double C1 = 4.16666666666666019037e-02,  /* 0x3FA55555, 0x5555554C */
-        C2 = -1.38888888888741095749e-03,                 /* 0xBF56C16C, 0x16C15177 */
-        C3 = 2.48015872894767294178e-05,                  /* 0x3EFA01A0, 0x19CB1590 */
-        C4 = -2.75573143513906633035e-07,                 /* 0xBE927E4F, 0x809C52AD */
-        C5 = 2.08757232129817482790e-09,                  /* 0x3E21EE9E, 0xBDB4B1C4 */
-        C6 = -1.13596475577881948265e-11;                 /* 0xBDA8FAE9, 0xBE8838D4 */
-    const double z = y * y, w = z * z, ww = w * w;
-    const double odd = (S1 + z * S2) + w * (S3 + z * S4) + ww * (S5 + z * S6);
-    const double s = y + (z * y * odd + (tail - z * (0.5 * tail)));
-    const double even = w * (C1 + z * C2) + ww * ((C3 + z * C4) + w * (C5 + z * C6));
-    const double half = 0.5 * z, one = 1.0 - half;
-    const double c = one + ((((1.0 - one) - half) - y * tail) + even);
+    double s, c;
+    TRIG_POLYNOMIALS(double, y, tail, s, c);
     if (n == 0)
         return (struct trig_pair){s, c};
     if (n == 1)

@@ -1,0 +1,253 @@
+"""Many craft at once: each with the bits of the kernel that the native FMU has, whatever its neighbours do."""
+
+import math
+import threading
+from dataclasses import astuple, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hovercraft_fmu import advance_fleet
+from hovercraft_fmu.host.fleet import Crafts, observe_fleet
+from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.dynamics import Controls, State
+from hovercraft_fmu.model.integrators import INTEGRATORS
+from hovercraft_fmu.model.subcycling import Settings
+from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.simulation import plan, schedule
+from tests.native import KERNEL_FILES, Kernel, compile_c
+
+pytestmark = pytest.mark.usefixtures("fleet")
+METHODS = {method.name: method for method in INTEGRATORS}
+EVERY = pytest.mark.parametrize("method", METHODS)
+STEPS = {"semi_implicit_euler": 0.001, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
+TERMS: dict[str, dict[str, float]] = {
+    "plain": {},
+    "directional": {"drag_area": 2},
+    "spin": {"rotational_drag": 0.7},
+    "friction": {"skirt_friction": 0.003},
+    "no drag": {"drag_coefficient": 0.0},
+    "wind": {},
+}
+
+
+@pytest.fixture(scope="module")
+def kernel(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
+    """That of the native FMU, by this machine's compiler."""
+    return Kernel(compile_c(tmp_path_factory.mktemp("kernel") / "kernel.so", KERNEL_FILES, "-shared", "-fPIC", "-lm"))
+
+
+def drawn(count: int, seed: int, **parameters: Any) -> tuple[list[State], list[Controls], list[Craft]]:
+    """Craft that go at anything from a creep to a gale, and head anywhere, some of them after millions of turns."""
+    dice = np.random.default_rng(seed)
+
+    def sized(least: float, most: float) -> Any:
+        return dice.choice([-1.0, 1.0], count) * 10.0 ** dice.uniform(least, most, count)
+
+    headings = np.where(dice.random(count) < 0.1, np.pi / 2 * dice.integers(-9, 9, count), sized(-3.0, 8.0))
+    moving = [sized(*range_) for range_ in ((-1.0, 3.0), (-1.0, 3.0), (-4.0, 1.0), (-4.0, 1.0), (-4.0, 0.0))]
+    states = [State(*row) for row in np.array([*moving[:2], headings, *moving[2:]]).T.tolist()]
+    controls = [Controls(*row) for row in dice.uniform(-0.5, 12.0, (count, 3)).tolist()]
+    ranges = {"mass": (50.0, 200.0), "inertia": (300.0, 900.0), "drag_center_fraction": (-0.5, 0.1)}
+    constants: Any = {name: dice.uniform(low, high, count).tolist() for name, (low, high) in ranges.items()}
+    crafts = [replace(Craft(), **{name: row[i] for name, row in constants.items()}, **parameters) for i in range(count)]
+    return states, controls, crafts
+
+
+def columns(rows: list[Any]) -> NDArray[np.float64]:
+    return np.array([tuple(row) for row in rows], float).T
+
+
+def assert_alike(found: Any, expected: list[tuple[str, Any]], before: list[State]) -> None:
+    for i, (outcome, stretch) in enumerate(expected):
+        assert (outcome == "advanced") == (i not in found.refused), found.refused.get(i)
+        if outcome == "advanced":
+            assert tuple(found.states[:, i]) == stretch.state, i
+            assert found.substeps[i] == stretch.substeps
+            assert (found.drag_mass[i], found.rotation[i]) == (stretch.drag_mass, stretch.rotation)
+            assert found.proposed[i] == stretch.proposed
+        else:
+            assert tuple(found.states[:, i]) == before[i]
+
+
+@EVERY
+@pytest.mark.parametrize("term", TERMS)
+@pytest.mark.parametrize("ramped", [False, True])
+def test_each_craft_has_the_bits_of_the_native_fmu(term: str, method: str, ramped: bool, kernel: Kernel) -> None:
+    states, controls, crafts = drawn(43, seed=len(term), **TERMS[term])
+    if term == "wind":
+        controls = [each._replace(wind_x=0.2, wind_y=-0.1) for each in controls]
+    slope = Controls(0.7, 0.2, -0.1, 0.05, 0.0) if ramped else Controls(0.0)
+    way = Settings(STEPS[method], METHODS[method], 1e-6)
+    found = advance_fleet(columns(states), columns(controls), crafts, 0.73, way, slope)
+    expected = [
+        kernel.advance(state, held, craft, 0.73, way, rate=slope)
+        for state, held, craft in zip(states, controls, crafts, strict=True)
+    ]
+    assert_alike(found, expected, states)
+    assert sum(outcome == "advanced" for outcome, _ in expected) > 20
+
+
+@EVERY
+@pytest.mark.parametrize("name", SCENES)
+def test_every_scene(name: str, method: str, kernel: Kernel) -> None:
+    """At full length; nine craft, so that a block and one more go through it."""
+    run = plan(name, start_values={"integrator": method, "step_size": STEPS[method]})
+    states = np.tile(np.array(run.start)[:, None], 9)
+    state, proposed, own = run.start, np.zeros(9), 0.0
+    for time, end, held in schedule(run):
+        found = advance_fleet(states, held, run.craft, end - time, run.settings, proposed=proposed)
+        states, proposed = found.states, found.proposed
+        outcome, made = kernel.advance(state, held, run.craft, end - time, run.settings, own)
+        state, own = made.state, made.proposed
+        assert outcome == "advanced"
+    assert not found.refused
+    assert (states == np.array(state)[:, None]).all()
+
+
+@pytest.mark.parametrize("method", ["semi_implicit_euler", "rk4"])
+def test_neighbours_change_nothing(method: str) -> None:
+    """Whatever the number of craft and their order, with others in between that cannot be, or go elsewhere."""
+    states, controls, crafts = drawn(29, seed=3)
+    way = Settings(STEPS[method], METHODS[method])
+    whole = advance_fleet(columns(states), columns(controls), crafts, 1.0, way)
+    crafts = [replace(each, skirt_friction=0.01) if i % 5 == 2 else each for i, each in enumerate(crafts)]
+    states = [each._replace(vx=1e200) if i % 7 == 3 else each for i, each in enumerate(states)]
+    states[11] = states[11]._replace(heading=math.nan)
+    mixed = advance_fleet(columns(states), columns(controls), crafts, 1.0, way)
+    assert {3, 10, 11, 24} <= set(mixed.refused)
+    for i in range(29):
+        alone = advance_fleet(columns(states[i : i + 1]), columns(controls[i : i + 1]), crafts[i], 1.0, way)
+        np.testing.assert_array_equal(alone.states[:, 0], mixed.states[:, i])
+        if i % 5 != 2 and i % 7 != 3 and i != 11:
+            np.testing.assert_array_equal(whole.states[:, i], mixed.states[:, i])
+    assert mixed.refused[11] == "heading = nan: must be a finite number"
+    assert "must stay a finite number" in mixed.refused[3]
+    assert mixed.states[3, 3] == 1e200
+
+
+def test_steps_and_tolerances_of_their_own() -> None:
+    """Craft whose numbers of sub-steps differ do not go side by side, and have their own bits all the same."""
+    states, controls, crafts = drawn(20, seed=5)
+    step, size, tolerance = np.linspace(0.1, 2.0, 20), np.geomspace(0.001, 0.1, 20), np.geomspace(1e-9, 1e-3, 20)
+    for method in INTEGRATORS:
+        way = Settings(size, method, tolerance)  # type: ignore[arg-type]
+        found = advance_fleet(columns(states), columns(controls), crafts, step, way)
+        for i in range(20):
+            own = Settings(float(size[i]), method, float(tolerance[i]))
+            alone = advance_fleet(states[i], controls[i], crafts[i], float(step[i]), own)
+            assert tuple(alone.states[:, 0]) == tuple(found.states[:, i])
+            assert alone.substeps[0] == found.substeps[i]
+
+
+def test_rows_are_read_where_they_are_and_never_written_into() -> None:
+    states, controls, crafts = drawn(16, seed=7)
+    rows = np.ascontiguousarray(columns(states).T)  # a craft a row: the columns have strides
+    rows.setflags(write=False)
+    one = advance_fleet(rows.T, columns(controls), crafts, 0.5)
+    other = advance_fleet(columns(states), columns(controls), Crafts.of(crafts), 0.5)
+    np.testing.assert_array_equal(one.states, other.states)
+    records = np.zeros(16, [("pad", "u1"), ("x", "f8")])  # numbers at odd places
+    records["x"] = rows[:, 0]
+    moved = advance_fleet([records["x"], *columns(states)[1:]], columns(controls), crafts, 0.5)
+    np.testing.assert_array_equal(moved.states, one.states)
+
+
+def test_no_craft_one_craft_and_a_step_of_no_time() -> None:
+    assert advance_fleet(np.empty((6, 0)), Controls(5.0), Craft(), 0.1).states.shape == (6, 0)
+    one = advance_fleet(State(vx=0.3), Controls(5.0), Craft(), 0.0)
+    assert tuple(one.states[:, 0]) == State(vx=0.3)
+    assert one.substeps.tolist() == [0]
+    assert not one.refused
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"states": np.zeros((5, 3))}, "states: 5 rows: must be 6, one for each quantity"),
+        ({"controls": np.zeros((5, 4))}, "thrust: shape (4,): must be (3,), one for each craft"),
+        ({"communication_step": np.zeros(2)}, "communication_step: shape (2,): must be (3,), one for each"),
+        ({"crafts": [Craft()] * 2}, "mass: shape (2,): must be (3,), one for each"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_named(change: dict[str, Any], says: str) -> None:
+    given: dict[str, Any] = {"states": np.zeros((6, 3)), "controls": Controls(), "crafts": Craft()}
+    with pytest.raises(ValueError, match="must be") as caught:
+        advance_fleet(**({"communication_step": 0.1} | given | change))
+    assert str(caught.value).startswith(says)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "says"),
+    [
+        ({"mass": [1.0, -2.0, 3.0]}, "craft 1: mass = -2.0: must be greater than 0"),
+        ({"drag_area": [1, 1.5]}, "craft 1: drag_area = 1.5: must be one of 1 (constant), 2 (directional)"),
+        ({"thrust_min": [0.0, 20.0]}, "craft 1: thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"),
+        ({"air_density": [1.0, 1e300], "length": 1e10}, "craft 0: spin_drag_factor = "),
+        ({"mass": math.nan}, "mass = nan: must be a finite number"),
+        ({"weight": 1.0}, "weight: must be a parameter of a craft: mass, "),
+        ({"mass": [1.0, 2.0], "inertia": [1.0, 2.0, 3.0]}, "mass: shape (2,): must be (3,)"),
+    ],
+)
+def test_craft_that_cannot_be(parameters: dict[str, Any], says: str) -> None:
+    if "air_density" in parameters:
+        says = "craft 1: drag_factor = inf kg/m: must be a finite number"
+    with pytest.raises(ValueError, match=r"must be|must not") as caught:
+        Crafts(**parameters)
+    assert str(caught.value).startswith(says)
+
+
+REFUSED = {
+    "x": ({"step": -0.1}, "communication_step = -0.1: must not be negative"),
+    "size": ({"size": 0.0}, "step_size = 0.0: must be greater than 0"),
+    "many": ({"step": 1e9}, "communication step = 1000000000.0 s: must not need more than 10^9 sub-steps of step_size"),
+    "slope": ({"slope": math.inf}, "slope of thrust = inf: must be a finite number"),
+    "small": ({"tolerance": 1e-300, "method": 3}, "step = "),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_each_refusal_has_its_reason(name: str) -> None:
+    change, says = REFUSED[name]
+    way = Settings(change.get("size", 0.001), INTEGRATORS[int(change.get("method", 0))], change.get("tolerance", 1e-6))
+    step = np.array([0.1, change.get("step", 0.1)])
+    slopes = Controls(0.0)._replace(thrust=np.array([0.0, change.get("slope", 0.0)]))  # type: ignore[arg-type]
+    found = advance_fleet(State(vx=1.0), Controls(), Crafts(mass=[100.0, 101.0]), step, way, slopes)
+    assert found.refused[1].startswith(says)
+    assert tuple(found.states[:, 1]) == State(vx=1.0)
+
+
+def test_what_is_seen_of_them(kernel: Kernel) -> None:
+    for parameters in TERMS.values():
+        states, controls, crafts = drawn(9, seed=9, **parameters)
+        states[4] = State(heading=0.3)
+        seen = observe_fleet(columns(states), columns(controls), crafts)
+        for i, (state, held, craft) in enumerate(zip(states, controls, crafts, strict=True)):
+            assert tuple(seen[2:, i]) == kernel.loads(state, held, craft)[:3]
+            surge, sway = math.cos(state.heading), math.sin(state.heading)
+            forward = surge * state.vx + sway * state.vy
+            assert seen[0, i] == pytest.approx(forward, rel=1e-12, abs=1e-14 * math.hypot(state.vx, state.vy))
+
+
+def test_the_interpreter_goes_on_meanwhile() -> None:
+    """A thread counts while another one is in C."""
+    running, counted = threading.Event(), 0
+
+    def fly() -> None:
+        advance_fleet(np.zeros((6, 8)), Controls(), Craft(), 2000.0, Settings(0.001, METHODS["drag_implicit"]))
+        running.clear()
+
+    running.set()
+    thread = threading.Thread(target=fly)
+    thread.start()
+    while running.is_set():
+        counted += 1
+    thread.join()
+    assert counted > 1000
+
+
+def test_constants_are_in_the_order_of_the_craft() -> None:
+    names = list(Crafts().columns)
+    assert [float(Crafts().columns[name]) for name in names] == list(map(float, astuple(Craft())))
