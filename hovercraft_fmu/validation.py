@@ -120,7 +120,7 @@ def _run_problems(path: Path, description: Any, exchange: bool = False) -> list[
     experiment = description.defaultExperiment
     step = float(experiment.stepSize if experiment and experiment.stepSize else 0.01)
     try:
-        with Fmu(path) as fmu, fmu.instance(exchange) as instance, instance.driven_by_fmpy():
+        with Fmu(path, validate=False) as fmu, fmu.instance(exchange) as instance, instance.driven_by_fmpy():
             rows = fmpy.simulate_fmu(
                 fmu.folder,
                 model_description=description,

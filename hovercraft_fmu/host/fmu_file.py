@@ -26,15 +26,16 @@ class Fmu:
     Args:
         path: the file.
         model: the name of the model that it must be of; without it any.
+        validate: whether its description must be valid.
 
     Raises:
         FileNotFoundError: no such file.
         ValueError: see `read_description`.
     """
 
-    def __init__(self, path: str | os.PathLike[str], model: str | None = None) -> None:
+    def __init__(self, path: str | os.PathLike[str], model: str | None = None, validate: bool = True) -> None:
         self.path = Path(path)
-        self.description = read_description(self.path, model=model)
+        self.description = read_description(self.path, validate, model)
         self.is_fmi_3: bool = self.description.fmiVersion == "3.0"
         self._folder = tempfile.TemporaryDirectory(prefix="hovercraft_fmu_")
         self.folder = self._folder.name
