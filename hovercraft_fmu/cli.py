@@ -26,15 +26,13 @@ from rich.table import Table
 from rich.text import Text
 
 from ._version import __version__
-from .autopilot.pilot_package import build_autopilot
-from .building import FOLDER, PRODUCTS, Product, product
+from .building import FOLDER, PRODUCTS, Kind, Product, build, default_fmu, default_kind, product
 from .coupling import Passage, sail
 from .fmu.machine_code import NotCompiledError
-from .fmu.python_package import build_fmu
 from .host import SimulationError
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES, VOYAGES
-from .simulation import DEFAULT_FMU, Inputs, Result, default_fmu, plan, run_fmu
+from .simulation import Inputs, Result, plan, run_fmu
 from .studies import STUDIES, carry_out
 from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE
@@ -108,8 +106,15 @@ def _written(chosen: Product, path: Path) -> str:
     return ""
 
 
+def of_an_fmu(command: Callable[..., None]) -> Callable[..., None]:
+    """The argument FMU and the option --fmu of a command that runs one."""
+    kinds = click.Choice(["native", "native3", "python"])
+    option = click.option("--fmu", "kind", type=kinds, help="Instead of a file: the FMU of that kind in build/.")
+    return click.argument("fmu", required=False, type=click.Path(path_type=Path))(option(command))
+
+
 @commands.command("simulate")
-@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@of_an_fmu
 @click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
 @click.option(
     "--input", "log", metavar="FILE.csv", type=click.Path(path_type=Path),
@@ -135,6 +140,7 @@ def _written(chosen: Product, path: Path) -> str:
 @click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
 def simulate_command(
     fmu: Path | None,
+    kind: Kind | None,
     scene: str | None,
     log: Path | None,
     settings: tuple[str, ...],
@@ -147,7 +153,7 @@ def simulate_command(
 ) -> None:
     """Run the FMU through fmpy: a named scene, or a control log.
 
-    FMU is the file; without it build/Hovercraft.fmu, which is built if it is not there.
+    FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there.
     """
     if list_scenes:
         return _print_scenes()
@@ -166,7 +172,8 @@ def simulate_command(
         from .view.animation import check_animation
 
         check_animation(animation)
-    results = [_simulated(inputs, fmu, start_values=each, **options) for each in (start_values, *others)]
+    path = _named(fmu, kind)
+    results = [_simulated(inputs, path, start_values=each, **options) for each in (start_values, *others)]
     for result in results:
         _print_result(result)
     _write(results[0], output, plot)
@@ -176,7 +183,7 @@ def simulate_command(
 
 
 @commands.command("drive")
-@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@of_an_fmu
 @click.option("--record", metavar="FILE.csv", type=click.Path(path_type=Path), help="Write what you do, to replay it.")
 @click.option("--preset", metavar="NAME", default=PRESET, show_default=True, help=f"A craft: {', '.join(PRESETS)}.")
 @click.option("--integrator", metavar="NAME", help="The method of a sub-step; as --set integrator=NAME.")
@@ -188,6 +195,7 @@ def simulate_command(
 )
 def drive_command(
     fmu: Path | None,
+    kind: Kind | None,
     record: Path | None,
     preset: str,
     integrator: str | None,
@@ -198,7 +206,7 @@ def drive_command(
 ) -> None:
     """Drive the FMU from the keyboard: the arrow keys, in a window, in real time.
 
-    FMU is the file; without it build/Hovercraft.fmu, which is built if it is not there. H shows the keys. What is
+    FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there. H shows the keys. What is
     recorded replays to the same bits, with the command that is printed at the end.
     """
     from .view.drive import drive, plan_drive
@@ -206,7 +214,7 @@ def drive_command(
     short = {"integrator": integrator, "step_size": step_size}
     start_values = {**_settings(settings), **{k: v for k, v in short.items() if v is not None}}
     run = plan_drive(preset, start_values, communication_step)
-    path = default_fmu() if fmu is None else fmu
+    path = _named(fmu, kind)
 
     def recorded(log: Path) -> None:
         words = ["hovercraft-fmu", "simulate", str(path), "--input", str(log), "--preset", preset]
@@ -222,13 +230,14 @@ def drive_command(
 @click.argument("fmus", nargs=-1, metavar="[FMU ...]", type=click.Path(path_type=Path))
 @click.option("--table", is_flag=True, help="Ask other checkers and hosts, too, and print a table (Markdown).")
 def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
-    """Check FMUs: the schema, fmpy's validation, and a real run. Default: build/Hovercraft.fmu."""
+    """Check FMUs: the schema, fmpy's validation, and a real run. Without FMU: build/HovercraftNative.fmu."""
+    fmus = fmus or (default_fmu(),)
     if table:
-        checks = [check for fmu in fmus or (DEFAULT_FMU,) for check in (*validate(fmu), *validate_elsewhere(fmu))]
+        checks = [check for fmu in fmus for check in (*validate(fmu), *validate_elsewhere(fmu))]
         problems = sum(len(check.problems) for check in checks)
         click.echo(_checked_table(checks))
     else:
-        problems = sum(_validated(fmu) for fmu in fmus or (DEFAULT_FMU,))
+        problems = sum(_validated(fmu) for fmu in fmus)
     if problems:
         raise click.ClickException(f"{problems} problem{'s' if problems > 1 else ''} found")
     return 0
@@ -237,13 +246,23 @@ def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
 @commands.command()
 @click.option("--loop", is_flag=True, help="The closed loop: an autopilot FMU takes it round a course in a crosswind.")
 def demo(loop: bool) -> None:
-    """Build the FMU, check it, and drive it over a recorded control log; see build/demo/."""
-    fmu = _built_and_valid(build_fmu())
+    """Build the FMUs, check them, and drive them over a recorded control log; see build/demo/."""
+    from .view.plots import check_plot
+
+    picture = check_plot(DEMO_FOLDER / ("loop.png" if loop else "ice.png"))
+    native = _built_and_valid(default_kind())
     if loop:
-        return _demo_of_the_loop(fmu, _built_and_valid(build_autopilot()))
-    result = _simulated(DEMO_LOG, fmu, preset="ice", communication_step=SCENES["ice"].communication_step)
+        return _demo_of_the_loop(native, _built_and_valid("autopilot"), picture)
+    python = _built_and_valid("python")
+    options = {"preset": "ice", "communication_step": SCENES["ice"].communication_step}
+    result, other = (_simulated(DEMO_LOG, fmu, **options) for fmu in (native, python))
     _print_result(result)
-    _write(result, DEMO_FOLDER / "ice.csv", DEMO_FOLDER / "ice.png")
+    largest, column = max((float(np.abs(result[name] - other[name]).max()), name) for name in result.names)
+    OUTPUT.print(
+        f"{native.name} and {python.name} agree: of {len(result.names)} columns and {len(result['time'])} rows "
+        f"the largest difference is {largest:.2g}, of {column}"
+    )
+    _write(result, DEMO_FOLDER / "ice.csv", picture)
     OUTPUT.print(
         "\nWorth trying next:\n"
         "  hovercraft-fmu simulate --scene turn --plot build/turn.png\n"
@@ -253,14 +272,15 @@ def demo(loop: bool) -> None:
     return None
 
 
-def _built_and_valid(fmu: Path) -> Path:
+def _built_and_valid(kind: Kind) -> Path:
+    fmu = build(kind)
     OUTPUT.print(f"built {fmu}")
     if _validated(fmu):
         raise click.ClickException("the FMU is not valid")
     return fmu
 
 
-def _demo_of_the_loop(fmu: Path, autopilot: Path) -> None:
+def _demo_of_the_loop(fmu: Path, autopilot: Path, picture: Path) -> None:
     voyage = VOYAGES["crosswind"]
     with _progress(voyage.stop_time) as progress:
         passage = sail(voyage, fmu, autopilot, progress=progress)
@@ -268,7 +288,7 @@ def _demo_of_the_loop(fmu: Path, autopilot: Path) -> None:
     OUTPUT.print(f"wrote {passage.write_csv(DEMO_FOLDER / 'loop.csv')}")
     from .view.plots import plot_passage
 
-    OUTPUT.print(f"wrote {plot_passage(passage, DEMO_FOLDER / 'loop.png')}")
+    OUTPUT.print(f"wrote {plot_passage(passage, picture)}")
 
 
 MEASURE = """Measure the product: what speed costs, what accuracy costs, where the methods break.
@@ -292,33 +312,40 @@ def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 
 
 
 @commands.command("sweep")
-@click.argument("study", required=False)
-@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@click.argument("study")
+@of_an_fmu
 @click.option("--engine", metavar="NAME", default="fmu", show_default=True,
               help="fmu, or batch: the bare model, all craft at once (fixed-step integrators).")  # fmt: skip
 @click.option("--workers", type=int, metavar="N", help="Processes on this machine. Default: one a processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
 @click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Default: build/sweep/ and the study.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the results.")
-def sweep_command(study: str | None, fmu: Path | None, output: Path | None, plot: Path | None, **options: Any) -> None:
+def sweep_command(
+    study: str,
+    fmu: Path | None,
+    kind: Kind | None,
+    output: Path | None,
+    plot: Path | None,
+    engine: str,
+    **options: Any,
+) -> None:
     """Make many runs of one FMU, in parallel, into Parquet files.
 
     STUDY is a TOML file, or the name of a study of the package: turning_circle. FMU is the file; without it
-    build/Hovercraft.fmu, which is built if it is not there. (The native FMU is many times as fast.) A sweep that was
-    ended goes on where it was with the same command.
+    build/HovercraftNative.fmu, which is built if it is not there. A sweep that was ended goes on where it was with the
+    same command.
     """
     from .sweep import read_study, sweep
 
-    if study is None:
-        raise click.UsageError("STUDY: must be given")
     chosen = read_study(study)
     if plot:
         from .view.plots import check_plot
 
         check_plot(plot)
+    path = fmu if engine == "batch" and not kind else _named(fmu, kind)
     begun = perf_counter()
     with _progress(chosen.runs, "sweeping", MofNCompleteColumn(), _Rate()) as tell:
-        outcome = sweep(chosen, fmu, output=output, tell=tell, **options)
+        outcome = sweep(chosen, path, engine=engine, output=output, tell=tell, **options)
     seconds = perf_counter() - begun
     OUTPUT.print(f"{outcome.folder}: {outcome.runs} runs, {outcome.new} of them made now in {seconds:.1f} s")
     if outcome.error:
@@ -330,7 +357,6 @@ def sweep_command(study: str | None, fmu: Path | None, output: Path | None, plot
         from .sweep.plots import plot_sweep
 
         OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
-    return
 
 
 @commands.command("cross-check")
@@ -390,10 +416,19 @@ def _tell_lines(doing: str, task: Task, ended: Event) -> None:
         click.echo(f"{doing}: {task.percentage:.0f} %, {perf_counter() - begun:.0f} s", err=True)
 
 
-def _simulated(inputs: Inputs, fmu: Path | None, **options: Any) -> Result:
+def _named(fmu: Path | None, kind: Kind | None) -> Path:
+    """The file that is to be run, and say which it is."""
+    if fmu and kind:
+        raise click.UsageError(f"--fmu {kind}: must not be given together with the file {fmu}")
+    path = fmu or default_fmu(kind)
+    OUTPUT.print(f"running {path}")
+    return path
+
+
+def _simulated(inputs: Inputs, fmu: Path, **options: Any) -> Result:
     run = plan(inputs, **options)
     with _progress(run.stop_time) as progress:
-        return run_fmu(run, fmu or default_fmu(), progress)
+        return run_fmu(run, fmu, progress)
 
 
 def _validated(fmu: Path) -> int:

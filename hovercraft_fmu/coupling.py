@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from .autopilot.guidance import Commands, Gains, Pilot, Sight, Waypoint, steer
 from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
-from .autopilot.pilot_package import build_autopilot
+from .building import default_fmu
 from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
 from .host import Fmu, Instance
 from .model.craft import Craft
 from .model.dynamics import Controls, State
 from .model.subcycling import Settings, advance
 from .scenes import Voyage, voyage
-from .simulation import Progress, default_fmu, path_length, write_csv
+from .simulation import Progress, path_length, write_csv
 
 JACOBI, GAUSS_SEIDEL = SCHEMES = ("jacobi", "gauss_seidel")
 """Both parts step side by side, with what the other one showed before; or the autopilot steps first, and the craft
@@ -29,7 +29,6 @@ COLUMNS = ("time", *STATES, *OUTPUTS)
 WIND = INPUTS[3:]
 START_VALUES = (*CRAFT_PARAMETERS, *STATES, *WIND)
 """Of the hovercraft: what a voyage may set."""
-DEFAULT_AUTOPILOT = Path("build") / f"{AUTOPILOT_MODEL.name}.fmu"
 
 
 class Part(Protocol):
@@ -112,8 +111,7 @@ def sail(
         SimulationError: an FMU refused a value or a step, with its message.
     """
     chosen = _chosen(which)
-    if autopilot is None:
-        autopilot = DEFAULT_AUTOPILOT if DEFAULT_AUTOPILOT.exists() else build_autopilot(DEFAULT_AUTOPILOT)
+    autopilot = default_fmu("autopilot") if autopilot is None else autopilot
     with (
         Fmu(fmu or default_fmu(), HOVERCRAFT.name) as craft_fmu,
         Fmu(autopilot, AUTOPILOT_MODEL.name) as pilot_fmu,

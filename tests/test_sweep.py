@@ -34,6 +34,7 @@ from hovercraft_fmu.model.dynamics import Controls
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator
 from hovercraft_fmu.model.subcycling import Settings, substeps
 from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.simulation import Value
 from hovercraft_fmu.studies import carry_out, sweep_costs
 from hovercraft_fmu.sweep import STUDIES, load, read_study, sweep
 from hovercraft_fmu.sweep import runner as runner_module
@@ -157,7 +158,7 @@ def test_a_failed_run_is_a_row_with_its_error(each_fmu: Path, tmp_path: Path) ->
     assert "must stay a finite number; the step was refused" in made[1]["error"]
     assert made[3]["error"] == "thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"
     assert all(made[i][name] is None for i in (1, 3, 4, 5) for name in ("end.pose.x", "end.speed", "warnings"))
-    start = {"integrator": "rk4", "step_size": 0.1, "drag_area": 2, "velocity.x": 5.0}
+    start: dict[str, Value] = {"integrator": "rk4", "step_size": 0.1, "drag_area": 2, "velocity.x": 5.0}
     alone = simulate("turn", each_fmu, start_values=start)
     assert [made[2][f"end.{name}"] for name in ("pose.x", "speed")] == [alone[name][-1] for name in ("pose.x", "speed")]
 

@@ -8,7 +8,6 @@ of, so C that was changed since finds no folder, and stale machine code is never
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -247,7 +246,3 @@ def _require_compiler() -> None:
         raise OSError(f"no compiler: {package} {version} is not installed, or not to be had for this machine") from None
     if found != version:
         raise OSError(f"{package} {found} is installed: must be {version}, which makes the bytes")
-
-
-if __name__ == "__main__":
-    sys.exit(compile_all())

@@ -81,11 +81,8 @@ def write_python_fmu(path: str | os.PathLike[str], content: Content) -> Path:
 
 
 def _archive(content: Content) -> bytes:
-    flavour = content.flavour
-    code = {path.relative_to(PACKAGE).as_posix(): path.read_bytes() for path in _traveling(content)}
-    code |= {f"pythonfmu/{path.name}": path.read_bytes() for path in Path(pythonfmu.__file__).parent.glob("*.py")}
-    wrappers = _wrappers(flavour.identifier)
-    build = python_build(flavour, {**code, **wrappers})
+    flavour, code, wrappers = content.flavour, _code(content), _wrappers(content.flavour.identifier)
+    build = python_identity(content)
     # each module gets a name of its own, pythonfmu's, too: a host may have imported other ones of these names
     package = f"{flavour.identifier.lower()}_{build[:16]}"
     entry = ENTRY_SCRIPT.format(
@@ -106,13 +103,20 @@ def _archive(content: Content) -> bytes:
     )
 
 
-def python_build(flavour: Flavour, code: dict[str, bytes]) -> str:
+def python_identity(content: Content) -> str:
     """What the FMU is: a digest of its code and its table, but of nothing that is written about it."""
-    return digest({**code, "entry": ENTRY_SCRIPT.encode(), "table": xml(model_description("0" * 32, flavour))})
+    table = xml(model_description("0" * 32, content.flavour))
+    wrappers = _wrappers(content.flavour.identifier)
+    return digest({**_code(content), **wrappers, "entry": ENTRY_SCRIPT.encode(), "table": table})
 
 
-def _traveling(content: Content) -> list[Path]:
-    return sorted(path for pattern in (*SHARED, *content.travels) for path in PACKAGE.glob(pattern))
+def _code(content: Content) -> dict[str, bytes]:
+    """Of this package and of pythonfmu's, by path."""
+    ours = [path for pattern in (*SHARED, *content.travels) for path in PACKAGE.glob(pattern)]
+    return {
+        **{path.relative_to(PACKAGE).as_posix(): path.read_bytes() for path in ours},
+        **{f"pythonfmu/{path.name}": path.read_bytes() for path in Path(pythonfmu.__file__).parent.glob("*.py")},
+    }
 
 
 def _wrappers(identifier: str) -> dict[str, bytes]:

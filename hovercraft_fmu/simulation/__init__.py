@@ -2,13 +2,12 @@
 
 from .bare_run import run_model
 from .control_log import read_inputs
-from .fmu_run import DEFAULT_FMU, Stepper, default_fmu, run_fmu, simulate, stepping
+from .fmu_run import Stepper, run_fmu, simulate, stepping
 from .planning import Inputs, Progress, Run, Value, method_in_words, plan, start_value
 from .points import communication_points, controls_at, schedule
 from .result import Result, path_length, write_csv
 
 __all__ = [
-    "DEFAULT_FMU",
     "Inputs",
     "Progress",
     "Result",
@@ -17,7 +16,6 @@ __all__ = [
     "Value",
     "communication_points",
     "controls_at",
-    "default_fmu",
     "method_in_words",
     "path_length",
     "plan",

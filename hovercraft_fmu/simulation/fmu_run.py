@@ -1,51 +1,49 @@
 """A run on an FMU: through fmpy's master, or step by step."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import isclose
-from pathlib import Path
-from typing import Any
 
 import fmpy
 import numpy as np
 
+from ..building import default_fmu
 from ..fmu.interface import HOVERCRAFT, INPUTS
-from ..fmu.python_package import build_fmu
 from ..host import Fmu, Instance, SimulationError
 from ..model.dynamics import Controls
-from .planning import Inputs, Progress, Run, plan
+from .planning import Inputs, Progress, Run, Value, plan
 from .result import Result
-
-DEFAULT_FMU = Path("build") / f"{HOVERCRAFT.name}.fmu"
 
 
 def simulate(
     scene_or_inputs: Inputs = "launch",
     fmu: str | os.PathLike[str] | None = None,
     *,
+    preset: str | None = None,
+    start_values: Mapping[str, Value] | None = None,
+    start_time: float | None = None,
+    stop_time: float | None = None,
+    communication_step: float | None = None,
     progress: Progress | None = None,
-    **options: Any,
 ) -> Result:
     """Run a scene, or inputs of your own, on the FMU.
 
     Args:
         scene_or_inputs: see `Inputs`.
-        fmu: the file; without it build/Hovercraft.fmu under the current folder, which is built if it is not there.
+        fmu: the file; without it the native FMU in build/ under the current folder, which is built if it is not there.
+        preset, start_values, start_time, stop_time, communication_step: see `plan`.
         progress: see `Progress`.
-        options: see `plan`: preset, start_values, start_time, stop_time, communication_step.
 
     Raises:
         ValueError: an input, a name or a value that cannot be; FileNotFoundError: no such file.
         SimulationError: the FMU refused a value or a step, with its message; or the run ended early.
     """
-    run = plan(scene_or_inputs, **options)
+    run = plan(
+        scene_or_inputs, preset=preset, start_values=start_values, start_time=start_time, stop_time=stop_time,
+        communication_step=communication_step,
+    )  # fmt: skip
     return run_fmu(run, default_fmu() if fmu is None else fmu, progress)
-
-
-def default_fmu() -> Path:
-    """build/Hovercraft.fmu under the current folder, which is built if it is not there."""
-    return DEFAULT_FMU if DEFAULT_FMU.exists() else build_fmu(DEFAULT_FMU)
 
 
 def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = None) -> Result:

@@ -24,10 +24,10 @@ from dask.system import CPU_COUNT
 from distributed.comm.addressing import get_address_host_port
 
 from .._version import __version__
+from ..building import default_fmu
 from ..fmu.interface import HOVERCRAFT
 from ..host import SimulationError, read_description
 from ..model.integrators import INTEGRATORS
-from ..simulation import default_fmu
 from .batch import run_batch
 from .engines import SETTINGS, Driver, Plan
 from .quantities import quantity_function, row_columns
