@@ -32,7 +32,7 @@ from .fmu.machine_code import NotCompiledError
 from .host import SimulationError
 from .model.craft import PRESETS
 from .scenes import CONTROL_LOGS, SCENES, VOYAGES
-from .simulation import Inputs, Result, plan, run_fmu
+from .simulation import Inputs, Result, Run, plan, run_fmu
 from .studies import STUDIES, carry_out
 from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE
@@ -172,8 +172,9 @@ def simulate_command(
         from .view.animation import check_animation
 
         check_animation(animation)
+    runs = [plan(inputs, start_values=each, **options) for each in (start_values, *others)]
     path = _named(fmu, kind)
-    results = [_simulated(inputs, path, start_values=each, **options) for each in (start_values, *others)]
+    results = [_simulated(run, path) for run in runs]
     for result in results:
         _print_result(result)
     _write(results[0], output, plot)
@@ -254,8 +255,8 @@ def demo(loop: bool) -> None:
     if loop:
         return _demo_of_the_loop(native, _built_and_valid("autopilot"), picture)
     python = _built_and_valid("python")
-    options = {"preset": "ice", "communication_step": SCENES["ice"].communication_step}
-    result, other = (_simulated(DEMO_LOG, fmu, **options) for fmu in (native, python))
+    run = plan(DEMO_LOG, preset="ice", communication_step=SCENES["ice"].communication_step)
+    result, other = (_simulated(run, fmu) for fmu in (native, python))
     _print_result(result)
     largest, column = max((float(np.abs(result[name] - other[name]).max()), name) for name in result.names)
     OUTPUT.print(
@@ -342,7 +343,7 @@ def sweep_command(
         from .view.plots import check_plot
 
         check_plot(plot)
-    path = fmu if engine == "batch" and not kind else _named(fmu, kind)
+    path = _named(fmu, kind) if engine == "fmu" or kind else fmu
     begun = perf_counter()
     with _progress(chosen.runs, "sweeping", MofNCompleteColumn(), _Rate()) as tell:
         outcome = sweep(chosen, path, engine=engine, output=output, tell=tell, **options)
@@ -425,8 +426,7 @@ def _named(fmu: Path | None, kind: Kind | None) -> Path:
     return path
 
 
-def _simulated(inputs: Inputs, fmu: Path, **options: Any) -> Result:
-    run = plan(inputs, **options)
+def _simulated(run: Run, fmu: Path) -> Result:
     with _progress(run.stop_time) as progress:
         return run_fmu(run, fmu, progress)
 

@@ -1,6 +1,7 @@
 """What the tests share: one FMU, fresh processes, and no silent skip where skipping is not allowed."""
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -179,6 +180,13 @@ def fresh(tmp_path: Path) -> Fresh:
         return done.stdout
 
     return run
+
+
+@pytest.fixture
+def native_at_hand(native_fmu: Path, tmp_path: Path) -> Path:
+    """The native FMU where commands look for it first, in build/ under the shell's folder."""
+    (tmp_path / "build").mkdir()
+    return Path(shutil.copy(native_fmu, tmp_path / "build"))
 
 
 @pytest.fixture

@@ -14,8 +14,10 @@ from rich.console import Group
 from rich.table import Table
 
 from hovercraft_fmu.cli import OUTPUT
+from hovercraft_fmu.fmu.archive import zipped
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.studies import STUDIES
+from tests.conftest import FMI_2
 from tests.shell import Shell
 
 
@@ -35,14 +37,20 @@ def test_bare_command_helps(shell: Shell) -> None:
     assert all(command in printed for command in ("build", "simulate", "validate", "demo", "measure"))
 
 
+@pytest.mark.once
+@pytest.mark.usefixtures("complete_native_fmu")
+@FMI_2
 def test_demo(shell: Shell) -> None:
     printed = shell.ok("demo")
-    assert printed.count("  ok    ") == 3
+    assert printed.count("  ok    ") == 4 + 3
+    agree = re.search(r"HovercraftNative.fmu and Hovercraft.fmu agree: .* the largest difference is (\S+), of", printed)
+    assert agree
+    assert float(agree[1]) < 1e-12
     assert "FAILED" not in printed
     assert "47.4 craft lengths" in printed
     commands = [line.strip() for line in printed.splitlines() if line.startswith("  hovercraft-fmu ")]
     assert len(commands) == 3
-    assert (shell.folder / "build" / "Hovercraft.fmu").exists()
+    assert {path.name for path in (shell.folder / "build").glob("*.fmu")} == {"HovercraftNative.fmu", "Hovercraft.fmu"}
     assert (shell.folder / "build" / "demo" / "ice.csv").read_text().startswith('"time","thrust"')
     with Image.open(shell.folder / "build" / "demo" / "ice.png") as picture:
         assert picture.size == (1440, 810)
@@ -60,11 +68,11 @@ def test_a_control_log_is_read_once(shell: Shell, fmu: Path) -> None:
     assert "1 s, 100 communication steps" in printed
 
 
+@pytest.mark.usefixtures("native_at_hand")
 def test_build_and_validate(shell: Shell) -> None:
-    assert "no such FMU" in shell.refused("validate")
+    assert shell.ok("validate").startswith("checking build/HovercraftNative.fmu")
     printed, built = shell.ok("build", "python"), shell.folder / "build" / "Hovercraft.fmu"
     assert printed.startswith(f"build/Hovercraft.fmu: {built.stat().st_size / 1000:.0f} kB, ")
-    assert shell.ok("validate").count("  ok    ") == 3
     assert shell.ok("validate", "build/Hovercraft.fmu", "build/Hovercraft.fmu").count("checking") == 2
 
 
@@ -83,6 +91,38 @@ def test_validate_fails_loudly(fmu: Path, shell: Shell) -> None:
     assert "problems found" in done.err
 
 
+@pytest.mark.usefixtures("native_at_hand")
+def test_the_native_fmu_is_run_where_none_is_named(shell: Shell, fmu: Path) -> None:
+    short = ("simulate", "--stop-time", "1", "--set", "step_size=0.1")
+    native, python = shell.folder / "build" / "HovercraftNative.fmu", shell.folder / "build" / "Hovercraft.fmu"
+    printed = shell.ok(*short)
+    assert printed.startswith("running build/HovercraftNative.fmu\n")
+    assert not python.exists()
+    other = shell.ok(*short, "--fmu", "python")
+    assert other.startswith("running build/Hovercraft.fmu\n")
+    assert other.splitlines()[1:] == printed.splitlines()[1:]
+    assert python.read_bytes() == fmu.read_bytes()
+    assert "must not be given together" in shell.refused(*short, "--fmu", "python", "build/Hovercraft.fmu")
+    _edit(native, b' version="', b' version="0.0.')
+    assert "is of version 0.0.0.1.0 of hovercraft-fmu, which is 0.1.0 now; 'hovercraft-fmu build native' writes" in (
+        shell.refused(*short)
+    )
+    _edit(python, b' guid="{', b' guid="{f')
+    assert "was built of other code than there is now" in shell.refused(*short, "--fmu", "python")
+    native.write_bytes(b"no archive")
+    assert "must be an FMU with a model description" in shell.refused(*short)
+
+
+def _edit(fmu: Path, old: bytes, new: bytes) -> None:
+    """In the model description."""
+    with zipfile.ZipFile(fmu) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    files["modelDescription.xml"] = files["modelDescription.xml"].replace(old, new, 1)
+    assert old in files["modelDescription.xml"]
+    fmu.write_bytes(zipped(files))
+
+
+@pytest.mark.usefixtures("native_at_hand")
 def test_simulate_writes_what_is_asked_for(shell: Shell) -> None:
     printed = shell.ok(
         "simulate", "--scene", "turn", "--set", "mass=200", "--stop-time", "20", "--output", "a/turn.csv", "--plot",
@@ -93,6 +133,7 @@ def test_simulate_writes_what_is_asked_for(shell: Shell) -> None:
     assert (shell.folder / "a" / "turn.png").stat().st_size > 10000
 
 
+@pytest.mark.usefixtures("native_at_hand")
 def test_simulate_a_control_log(shell: Shell) -> None:
     (shell.folder / "log.csv").write_text("time,thrust\n0,5\n3,5\n")
     assert "3 s, 300 communication steps" in shell.ok("simulate", "--input", "log.csv", "--preset", "ice")
@@ -123,6 +164,7 @@ def test_list_scenes(shell: Shell) -> None:
         (("validate", "--table", "nix.fmu"), "nix.fmu: no such FMU"),
     ],
 )  # fmt: skip
+@pytest.mark.usefixtures("native_at_hand")
 def test_what_is_wrong_is_one_clear_line(shell: Shell, arguments: tuple[str, ...], message: str) -> None:
     assert message in shell.refused(*arguments)
 

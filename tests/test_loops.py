@@ -37,7 +37,7 @@ from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import VOYAGES, Voyage
 from hovercraft_fmu.ssp import build_ssp
 from hovercraft_fmu.studies import closed_loop as study
-from tests.conftest import FLAVOURS, ROOT
+from tests.conftest import FLAVOURS, FMI_2, ROOT
 from tests.masters import LOOPS, STEP, STEPS, VOYAGE, loop_in
 
 RK4 = Settings(0.1, integrator(3))
@@ -270,6 +270,9 @@ def test_the_ssp_is_valid_whole_and_the_same_every_time(each_fmu: Path, autopilo
 # ---- the commands
 
 
+@pytest.mark.once
+@pytest.mark.usefixtures("complete_native_fmu")
+@FMI_2
 def test_the_demo_of_the_loop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(commands, ["demo", "--loop"])

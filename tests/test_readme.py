@@ -28,10 +28,9 @@ def commands() -> list[str]:
 
 
 @pytest.fixture
-def folder(fmu: Path, tmp_path: Path) -> Path:
-    """A folder with the FMU in build/."""
-    (tmp_path / "build").mkdir()
-    shutil.copy(fmu, tmp_path / "build")
+def folder(native_at_hand: Path, autopilot: Path, tmp_path: Path) -> Path:
+    """A folder with FMUs in build/."""
+    shutil.copy(autopilot, native_at_hand.parent)
     return tmp_path
 
 

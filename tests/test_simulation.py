@@ -12,6 +12,7 @@ from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.host.messages import plain
 from hovercraft_fmu.scenes import SCENES, signals
 from hovercraft_fmu.simulation import plan, read_inputs, run_fmu, run_model
+from tests.conftest import FMI_2
 
 
 def write(path: Path, text: str) -> Path:
@@ -19,10 +20,13 @@ def write(path: Path, text: str) -> Path:
     return path
 
 
+@pytest.mark.once
+@pytest.mark.usefixtures("complete_native_fmu")
+@FMI_2
 def test_three_lines_in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     result = hovercraft_fmu.simulate("launch")
-    assert (tmp_path / "build" / "Hovercraft.fmu").exists()
+    assert (tmp_path / "build" / "HovercraftNative.fmu").exists()
     assert result["time"][-1] == pytest.approx(60.0)
     assert result["velocity.x"][-1] == pytest.approx(0.29508, abs=5e-6)
 

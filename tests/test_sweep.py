@@ -672,7 +672,7 @@ def test_what_is_wrong_is_one_clear_line(
     for arguments, message in (
         (("nix.toml",), "nix.toml: No such file or directory"),
         (("bad.toml",), "bad.toml: frob = 3: the key must be one of scene"),
-        ((), "STUDY: must be given"),
+        ((), "Missing argument 'STUDY'"),
         (("turning_circle", "nix.fmu"), "nix.fmu: no such FMU"),
         (("turning_circle", "--engine", "steam"), "engine = 'steam': must be one of fmu, batch"),
     ):
