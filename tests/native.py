@@ -11,7 +11,7 @@ import pytest
 
 from hovercraft_fmu import hosts
 from hovercraft_fmu.fmu.description import NATIVE, Flavour
-from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, sources
+from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, headers, sources
 from hovercraft_fmu.hosts import compiler
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
@@ -37,7 +37,7 @@ def c_compiler() -> str:
 def written_sources(folder: Path, flavour: Flavour = NATIVE) -> Path:
     """The sources of a native FMU, generated header and all, in `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, content in sources("0" * 32, flavour).items():
+    for name, content in {**sources("0" * 32, flavour), **headers(flavour)}.items():
         (folder / name).write_bytes(content)
     return folder
 

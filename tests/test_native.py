@@ -23,6 +23,7 @@ from hypothesis import strategies as st
 
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STEP_UNSTABLE
+from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.host import read_description
 from hovercraft_fmu.hosts import hosts_of, run_in
@@ -606,7 +607,8 @@ def sanitized(fmu: Path, flavour: Flavour, folder: Path) -> Path:
         if name.startswith("sources/"):
             (folder / Path(name).name).write_bytes(content)
     command = [c_compiler(), "-std=c11", "-O1", "-ffp-contract=off", *SANITIZERS["address"], "-shared", "-fPIC"]
-    subprocess.run([*command, *flavour.sources, "-lm", "-o", "x.so"], cwd=folder, check=True)
+    headers = ("-I", str(C_FOLDER / f"fmi{flavour.fmi}"), f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX")
+    subprocess.run([*command, *headers, flavour.unit, "-o", "x.so"], cwd=folder, check=True)
     files[f"binaries/{binary('x86_64-linux', flavour)}"] = (folder / "x.so").read_bytes()
     path = folder / "Sanitized.fmu"
     with zipfile.ZipFile(path, "w") as archive:

@@ -2,7 +2,6 @@
 
 import io
 import re
-import subprocess
 import zipfile
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import BY_NAME
 from hovercraft_fmu.fmu.native_package import binary
 from tests.binaries import CPU_ARM64, CPU_X86_64, dll, dylib, elf, is_ad_hoc_signed, slices
-from tests.native import c_compiler
 
 pytestmark = pytest.mark.once
 
@@ -42,15 +40,6 @@ def archive(complete_native_fmu: Path) -> dict[str, bytes]:
 def flavour(standard: int) -> Flavour:
     """Of the archive."""
     return NATIVE if standard == 2 else NATIVE3
-
-
-@pytest.fixture
-def sources(archive: dict[str, bytes], tmp_path: Path) -> Path:
-    """The folder of that name, alone."""
-    for name, content in archive.items():
-        if name.startswith("sources/"):
-            (tmp_path / Path(name).name).write_bytes(content)
-    return tmp_path
 
 
 def test_what_is_inside(archive: dict[str, bytes], flavour: Flavour) -> None:
@@ -97,12 +86,6 @@ def test_what_fmi_3_lends(file: str, schema: str, archive: dict[str, bytes]) -> 
     assert archive["terminalsAndIcons/icon.png"].startswith(b"\x89PNG")
 
 
-def test_the_description_names_all_sources(archive: dict[str, bytes], flavour: Flavour) -> None:
-    file, tag = ("modelDescription.xml", "File") if flavour.fmi == 2 else ("sources/buildDescription.xml", "SourceFile")
-    listed = {node.get("name") for node in etree.fromstring(archive[file]).iter(tag)}
-    assert listed == {name.removeprefix("sources/") for name in archive if name.endswith(".c")}
-
-
 @pytest.mark.parametrize(("platform", "machine"), [("x86_64-linux", 62), ("aarch64-linux", 183)])
 def test_libraries_of_linux(platform: str, machine: int, archive: dict[str, bytes], flavour: Flavour) -> None:
     """glibc of 2012 is enough; no Python, no libm."""
@@ -139,48 +122,3 @@ def test_the_libraries_of_macos(archive: dict[str, bytes], flavour: Flavour) -> 
         assert found.minimum == (11, 0)
         # an arm64 Mac loads nothing that is not signed
         assert found.cpu != CPU_ARM64 or is_ad_hoc_signed(found.signature, part)
-
-
-def test_plain_cc_compiles_the_sources_without_a_warning(sources: Path, flavour: Flavour) -> None:
-    command = [c_compiler(), "-std=c11", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared", "-o", "x.so"]
-    for options in ([], ["-O2"], ["-O3", "-Wpedantic"]):
-        done = subprocess.run(
-            [*command, *options, *flavour.sources, "-lm"], cwd=sources, capture_output=True, text=True, check=False
-        )
-        assert (done.returncode, done.stderr) == (0, "")
-
-
-@pytest.mark.parametrize(
-    ("options", "has_prefix"),
-    [
-        ([], False),
-        (["-DFMI{fmi}_FUNCTION_PREFIX={name}_"], True),
-        (["-DFMI{fmi}_FUNCTION_PREFIX={name}_", "-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX"], False),
-    ],
-)
-def test_a_host_that_links_the_sources_chooses_the_prefix_of_the_functions(
-    options: list[str], has_prefix: bool, sources: Path, flavour: Flavour
-) -> None:
-    """As the standards have it for FMUs in C."""
-    file, name = f"fmi{flavour.fmi}", flavour.identifier
-    given = [option.format(fmi=flavour.fmi, name=name) for option in options]
-    command = [c_compiler(), "-std=c11", "-Wall", "-Wextra", "-Werror", *given, "-c", f"{file}.c"]
-    subprocess.run(command, cwd=sources, check=True)
-    printed = subprocess.run(["nm", f"{file}.o"], cwd=sources, capture_output=True, text=True, check=True).stdout
-    prefix = f"{name}_" if has_prefix else ""
-    assert set(re.findall(r" T (\w+)", printed)) == {f"{prefix}{each}" for each in functions(flavour)}
-
-
-def test_nothing_is_shared_between_instances_or_with_other_libraries(sources: Path, flavour: Flavour) -> None:
-    """No symbol of any object file lies in memory that can be written; each that a linker sees has a prefix.
-
-    Compiled without -fvisibility=hidden an `advance` of ours was once replaced by glibc's.
-    """
-    subprocess.run([c_compiler(), "-std=c11", "-O2", "-fno-pic", "-c", *flavour.sources], cwd=sources, check=True)
-    objects = sorted(sources.glob("*.o"))
-    assert len(objects) == len(flavour.sources)
-    printed = subprocess.run(["nm", *map(str, objects)], capture_output=True, text=True, check=True).stdout
-    assert f" T fmi{flavour.fmi}DoStep" in printed
-    assert re.findall(r"^[0-9a-f]+ [bBdDcC] .*$", printed, re.MULTILINE) == []
-    prefixes = rf"fmi{flavour.fmi}|kernel_|instance_|logarithm_|memory_|text_|trig_"
-    assert re.findall(rf" T (?!{prefixes})\w+", printed) == []

@@ -14,7 +14,7 @@ import pytest
 
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, MOTION, STATES
-from hovercraft_fmu.fmu.machine_code import OPTIONS, PLATFORMS, caches, compiler
+from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, PLATFORMS, caches, compiler
 from hovercraft_fmu.fmu.native_header import constant
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.scenes import SCENES
@@ -74,7 +74,9 @@ class Unpacked(NamedTuple):
     @property
     def options(self) -> tuple[str, ...]:
         """To compile a host for it."""
-        return (f"-DFMI={self.flavour.fmi}", "-I", str(self.folder / "sources"), *C_INCLUDES)
+        fmi = self.flavour.fmi
+        folders = ("-I", str(self.folder / "sources"), "-I", str(C_FOLDER / f"fmi{fmi}"), *C_INCLUDES)
+        return (f"-DFMI={fmi}", f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", *folders)
 
 
 @pytest.fixture(scope="module")
@@ -171,11 +173,11 @@ def host(unpacked: Unpacked, name: str, *options: str, linked: bool) -> Path:
     parts = (
         [str(path), f"-Wl,-rpath,{path.parent}"]
         if linked
-        else [str(unpacked.folder / "sources" / source) for source in unpacked.flavour.sources]
+        else [str(unpacked.folder / "sources" / unpacked.flavour.unit)]
     )
     command = [c_compiler(), *OPTIONS, "-Wall", "-Wextra", "-Werror", *unpacked.options, *options]
     done = subprocess.run(
-        [*command, str(C_TESTS / f"{name}.c"), *parts, "-pthread", "-lm", "-o", str(program)],
+        [*command, str(C_TESTS / f"{name}.c"), *parts, "-pthread", "-o", str(program)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

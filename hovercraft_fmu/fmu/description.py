@@ -42,7 +42,7 @@ CAPABILITIES_3 = {
     "providesEvaluateDiscreteStates": "false",
 }
 """Of FMI 3.0, whatever the interface. Intermediate update, early return and clocks: nothing that could check them."""
-SOURCES = (
+PARTS = (
     "exchange.c",
     "instance.c",
     "kernel.c",
@@ -85,10 +85,15 @@ class Flavour:
     categories: Mapping[str, str]
     exchange: Mapping[str, str] = field(default_factory=dict)
     """The capabilities in model exchange; none where there is no such interface."""
-    sources: tuple[str, ...] = ()
-    """Files of sources/ to compile."""
+    parts: tuple[str, ...] = ()
+    """Files of C in sources/, which `unit` includes."""
     fmi: Literal[2, 3] = 2
     """The version of the standard."""
+
+    @property
+    def unit(self) -> str:
+        """The one file of C to compile: both standards want it named after the model identifier."""
+        return f"{self.identifier}.c"
 
     def of(self, model: Model) -> "Flavour":
         """The same kind of FMU of another model."""
@@ -121,7 +126,7 @@ NATIVE = Flavour(
     ),
     exchange=MappingProxyType({**COMMON_CAPABILITIES, **NATIVE_CAPABILITIES}),
     categories=MappingProxyType(LOG_CATEGORIES),
-    sources=("fmi2.c", *SOURCES),
+    parts=("fmi2.c", *PARTS),
 )
 NATIVE3 = Flavour(
     model=HOVERCRAFT,
@@ -140,7 +145,7 @@ NATIVE3 = Flavour(
     ),
     exchange=MappingProxyType({"needsCompletedIntegratorStep": "true", **CAPABILITIES_3}),
     categories=MappingProxyType(LOG_CATEGORIES),
-    sources=("fmi3.c", *SOURCES),
+    parts=("fmi3.c", *PARTS),
     fmi=3,
 )
 
@@ -203,10 +208,8 @@ def guid(build: str) -> str:
 
 def _interface(parent: Element, name: str, flavour: Flavour, capabilities: Mapping[str, str]) -> None:
     node = SubElement(parent, name, {"modelIdentifier": flavour.identifier, **capabilities})
-    if flavour.sources and flavour.fmi == 2:  # FMI 3.0 has them in sources/buildDescription.xml
-        files = SubElement(node, "SourceFiles")
-        for name in flavour.sources:
-            SubElement(files, "File", {"name": name})
+    if flavour.parts and flavour.fmi == 2:  # FMI 3.0 has them in sources/buildDescription.xml
+        SubElement(SubElement(node, "SourceFiles"), "File", {"name": flavour.unit})
 
 
 def _units(parent: Element, model: Model) -> None:

@@ -28,7 +28,7 @@ CHECKED: Mapping[str, str] = {
 def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
     """Path inside the documentation -> the whole page, for one of the hovercraft's FMUs."""
     values = {
-        "native": bool(flavour.sources),
+        "native": bool(flavour.parts),
         "flavour": flavour,
         "fmi": flavour.fmi,
         "types": FMI_3_TYPES if flavour.fmi == 3 else {},
@@ -48,7 +48,7 @@ def documents(flavour: Flavour) -> dict[str, bytes]:
     static = {
         path.relative_to(FOLDER).as_posix(): path.read_bytes() for path in sorted(FOLDER.rglob("*")) if _goes(path)
     }
-    if flavour.sources:
+    if flavour.parts:
         del static["externalDependencies.txt"]
     return {**static, **{name: page.encode() for name, page in pages(flavour).items()}}
 

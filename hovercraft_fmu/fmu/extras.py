@@ -20,12 +20,22 @@ ICON_SIZE = 100.0
 
 
 def build_description(flavour: Flavour, options: Iterable[str]) -> Element:
-    """sources/buildDescription.xml: the files to compile together, and the compiler options that keep the bits."""
+    """sources/buildDescription.xml: the file to compile, with any compiler; for GCC (and Clang, which takes the same)
+    the options of the binaries, too.
+    """
     root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": flavour.identifier})
-    files = SubElement(configuration, "SourceFileSet", {"language": "C11", "compilerOptions": " ".join(options)})
-    for name in flavour.sources:
-        SubElement(files, "SourceFile", {"name": name})
+    for compiler in ({}, {"compiler": "gcc", "compilerOptions": " ".join(options)}):
+        configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": flavour.identifier})
+        configuration.set("description", "GCC or Clang, as the binaries" if compiler else "any compiler of C11")
+        files = SubElement(configuration, "SourceFileSet", {"language": "C11", **compiler})
+        SubElement(files, "SourceFile", {"name": flavour.unit})
+        definition = {
+            "name": f"FMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX",
+            "optional": "true",
+            "value": "",
+            "description": "For a library that is loaded: the FMI functions have no prefix",
+        }
+        SubElement(files, "PreprocessorDefinition", definition)
     return root
 
 

@@ -30,8 +30,13 @@ WHY_NOT = "why_not.txt"
 """In COMPILED: why the last attempt failed, for those who did not see it."""
 OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
 """What keeps the bits, and keeps libm out."""
-LIBRARY_OPTIONS = ("-g0", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-slp-vectorize")
-"""A sub-step is one chain of operations: packing pairs of them into vectors costs a tenth of its time."""
+LIBRARY_OPTIONS = (
+    *("-g0", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-slp-vectorize"),
+    *("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX"),
+)
+"""In a library the FMI functions have no prefix.
+
+A sub-step is one chain of operations: packing pairs of them into vectors costs a tenth of its time."""
 TIME_LIMIT = 600.0
 """s, of one compilation: most take three."""
 
@@ -109,7 +114,23 @@ def libraries() -> list[Library]:
 
 def library(flavour: Flavour) -> Library:
     """Of a native FMU."""
-    return Library(flavour.identifier, flavour.sources, sources(identity(flavour), flavour))
+    return Library(flavour.identifier, (flavour.unit,), {**sources(identity(flavour), flavour), **headers(flavour)})
+
+
+UNIT = """\
+/* The whole FMU as one translation unit: of all that is in it a linker sees the FMI functions alone. In a program they
+   have a prefix; where a library is made of it, define FMI{fmi}_OVERRIDE_FUNCTION_PREFIX, which takes it away. */
+
+#ifndef FMI{fmi}_FUNCTION_PREFIX
+#define FMI{fmi}_FUNCTION_PREFIX {identifier}_
+#endif
+#define HIDDEN static
+#ifdef __GNUC__
+#pragma GCC diagnostic ignored "-Wunused-function" /* of what both standards share each leaves something out */
+#endif
+
+{includes}
+"""
 
 
 def fleet_library() -> Library:
@@ -120,10 +141,20 @@ def fleet_library() -> Library:
 
 
 def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
-    """All that a C compiler needs, by name; `build` is a hexadecimal digest of 32 digits."""
-    ours = [C_FOLDER / name for name in flavour.sources] + sorted(C_FOLDER.glob("*.h"))
-    headers = sorted((C_FOLDER / f"fmi{flavour.fmi}").glob("*.h"))
-    return {**{file.name: file.read_bytes() for file in (*ours, *headers)}, "variables.h": _header(build)}
+    """The C of an FMU, by name, without the standard's headers; `build` is a hexadecimal digest of 32 digits."""
+    files = [C_FOLDER / name for name in flavour.parts] + sorted(C_FOLDER.glob("*.h"))
+    includes = "\n".join(f'#include "{name}"' for name in flavour.parts)
+    unit = UNIT.format(fmi=flavour.fmi, identifier=flavour.identifier, includes=includes)
+    return {
+        **{file.name: file.read_bytes() for file in files},
+        "variables.h": _header(build),
+        flavour.unit: unit.encode(),
+    }
+
+
+def headers(flavour: Flavour) -> dict[str, bytes]:
+    """The standard's headers, by name: whoever compiles an FMU's sources has them."""
+    return {file.name: file.read_bytes() for file in sorted((C_FOLDER / f"fmi{flavour.fmi}").glob("*.h"))}
 
 
 def _header(build: str) -> bytes:
@@ -133,7 +164,7 @@ def _header(build: str) -> bytes:
 def identity(flavour: Flavour) -> str:
     """What the FMU is: a digest of code, table, compiler and options, but of nothing that is written about it."""
     table = xml(model_description("0" * 32, flavour))
-    return digest({**sources("0" * 32, flavour), **_made_by(flavour.sources), "table": table})
+    return digest({**sources("0" * 32, flavour), **headers(flavour), **_made_by((flavour.unit,)), "table": table})
 
 
 def _made_by(compiled: Sequence[str]) -> dict[str, bytes]:

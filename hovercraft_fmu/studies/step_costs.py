@@ -13,7 +13,7 @@ import polars as pl
 
 from ..fmu.description import NATIVE
 from ..fmu.interface import INPUTS
-from ..fmu.machine_code import sources
+from ..fmu.machine_code import headers, sources
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..host import Fmu, Instance
@@ -55,7 +55,7 @@ class Loops:
         name = compiler()
         if name is None:
             raise OSError(f"no C compiler ({', '.join(COMPILERS)})")
-        for file, content in sources("0" * 32).items():
+        for file, content in {**sources("0" * 32), **headers(NATIVE)}.items():
             (folder / file).write_bytes(content)
         path = folder / "step_costs.so"
         command = [name, *OPTIONS, "-I", str(folder), str(SOURCE), "-o", str(path), "-lm"]

@@ -9,9 +9,17 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "hidden.h"
 #include "linearization.h"
 #include "permits.h"
 #include "variables.h"
+
+/* What the faces call stands by itself: no arithmetic of it is moved in front of the call, or behind. */
+#ifdef __GNUC__
+#define DOOR HIDDEN __attribute__((noinline))
+#else
+#define DOOR HIDDEN
+#endif
 
 enum verdict { FINE, WARNED, REFUSED };
 
@@ -56,88 +64,90 @@ struct instance {
 };
 
 /* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. */
-void instance_start(struct instance *instance, enum use use, const struct services *services, bool logging);
-enum verdict instance_reset(struct instance *instance);
+DOOR void instance_start(struct instance *instance, enum use use, const struct services *services, bool logging);
+DOOR enum verdict instance_reset(struct instance *instance);
 
 /* What permits.c lets through (permits.h) is in the right phase and of the right use; no array is NULL. */
 
 /* Say something, and return the verdict. For `format` see text.h. */
-enum verdict instance_say(struct instance *instance, enum verdict verdict, const char *format, ...);
+DOOR enum verdict instance_say(struct instance *instance, enum verdict verdict, const char *format, ...);
 /* Switched on, only these categories are told; switched off, these no more. Without categories it is all of them. */
-enum verdict instance_log(struct instance *instance, bool on, size_t n, const char *const *categories);
+DOOR enum verdict instance_log(struct instance *instance, bool on, size_t n, const char *const *categories);
 
 /* ---- instance.c: the life cycle. `stop_time` is infinite where there is none. */
-enum verdict instance_set_up(struct instance *instance, double start_time, bool tolerance_given, double tolerance,
-                             double stop_time);
-enum verdict instance_initialize(struct instance *instance);
-enum verdict instance_go(struct instance *instance);
-enum verdict instance_terminate(struct instance *instance);
-bool instance_has_started(const struct content *content);
+DOOR enum verdict instance_set_up(struct instance *instance, double start_time, bool tolerance_given, double tolerance,
+                                  double stop_time);
+DOOR enum verdict instance_initialize(struct instance *instance);
+DOOR enum verdict instance_go(struct instance *instance);
+DOOR enum verdict instance_terminate(struct instance *instance);
+DOOR bool instance_has_started(const struct content *content);
 /* The inputs and the parameters as they are now: before the start, and in model exchange; refused where the parameters
    contradict one another. */
-enum verdict instance_take_up(struct instance *instance);
+DOOR enum verdict instance_take_up(struct instance *instance);
 /* The craft that the parameters make. */
-enum verdict instance_make_craft(struct instance *instance, struct craft *craft);
+DOOR enum verdict instance_make_craft(struct instance *instance, struct craft *craft);
 /* From some of the variables to a structure of doubles in their order, and back. */
-void instance_copy(void *into, const double *reals, const unsigned *references, unsigned n);
-void instance_spread(double *reals, const void *from, const unsigned *references, unsigned n);
+DOOR void instance_copy(void *into, const double *reals, const unsigned *references, unsigned n);
+DOOR void instance_spread(double *reals, const void *from, const unsigned *references, unsigned n);
 /* A state for the host, in memory of its own where *state is NULL; else it is one from before, to be used again. */
-enum verdict instance_save(struct instance *instance, void **state);
-enum verdict instance_keep(struct instance *instance, enum call call, const struct content *content, void **state);
-enum verdict instance_forget(struct instance *instance, void **state);
+DOOR enum verdict instance_save(struct instance *instance, void **state);
+DOOR enum verdict instance_keep(struct instance *instance, enum call call, const struct content *content, void **state);
+DOOR enum verdict instance_forget(struct instance *instance, void **state);
 /* Take up a content as a whole. Refused: one of another use. */
-enum verdict instance_restore(struct instance *instance, const struct content *content);
+DOOR enum verdict instance_restore(struct instance *instance, const struct content *content);
 
 /* ---- step.c */
-enum verdict instance_step(struct instance *instance, double point, double step);
+DOOR enum verdict instance_step(struct instance *instance, double point, double step);
 /* A word where inputs are out of their limits, and whether it is still to be said of the inputs as they are now. */
-enum verdict instance_warn_of_held_inputs(struct instance *instance, const struct controls *controls);
-bool instance_has_to_warn(const struct instance *instance);
+DOOR enum verdict instance_warn_of_held_inputs(struct instance *instance, const struct controls *controls);
+DOOR bool instance_has_to_warn(const struct instance *instance);
 
 /* ---- variables.c */
-enum verdict instance_get_reals(struct instance *instance, const unsigned *references, size_t n, double *values);
-enum verdict instance_get_integers(struct instance *instance, const unsigned *references, size_t n, int *values);
-enum verdict instance_set_reals(struct instance *instance, const unsigned *references, size_t n, const double *values);
-enum verdict instance_set_integers(struct instance *instance, const unsigned *references, size_t n, const int *values);
+DOOR enum verdict instance_get_reals(struct instance *instance, const unsigned *references, size_t n, double *values);
+DOOR enum verdict instance_get_integers(struct instance *instance, const unsigned *references, size_t n, int *values);
+DOOR enum verdict instance_set_reals(struct instance *instance, const unsigned *references, size_t n,
+                                     const double *values);
+DOOR enum verdict instance_set_integers(struct instance *instance, const unsigned *references, size_t n,
+                                        const int *values);
 /* As 64-bit numbers. */
-enum verdict instance_get_enumerations(struct instance *instance, const unsigned *references, size_t n,
-                                       int64_t *values);
-enum verdict instance_set_enumerations(struct instance *instance, const unsigned *references, size_t n,
-                                       const int64_t *values);
+DOOR enum verdict instance_get_enumerations(struct instance *instance, const unsigned *references, size_t n,
+                                            int64_t *values);
+DOOR enum verdict instance_set_enumerations(struct instance *instance, const unsigned *references, size_t n,
+                                            const int64_t *values);
 /* A call for a type that has no variables: an empty list is fine. */
-enum verdict instance_none_of(struct instance *instance, const char *name, const char *kind,
-                              const unsigned *references, size_t n);
+DOOR enum verdict instance_none_of(struct instance *instance, const char *name, const char *kind,
+                                   const unsigned *references, size_t n);
 /* A reference of a type that has no variables. */
-enum verdict instance_no_such(struct instance *instance, const char *kind, unsigned reference);
+DOOR enum verdict instance_no_such(struct instance *instance, const char *kind, unsigned reference);
 /* Where a reference is in a list, or its length. */
-unsigned instance_place(const unsigned *references, unsigned n, unsigned reference);
-enum verdict instance_check_settable(struct instance *instance, const struct variable *variable, double value);
+HIDDEN unsigned instance_place(const unsigned *references, unsigned n, unsigned reference);
+DOOR enum verdict instance_check_settable(struct instance *instance, const struct variable *variable, double value);
 /* Bring what is read of the motion up to the communication point; then what acts on the craft, which most hosts never
    ask for. */
-enum verdict instance_observe_motion(struct instance *instance);
-enum verdict instance_observe_action(struct instance *instance);
+DOOR enum verdict instance_observe_motion(struct instance *instance);
+DOOR enum verdict instance_observe_action(struct instance *instance);
 
 /* ---- rates.c: first derivatives, of inputs, from the next communication point on; of outputs, at this one. */
-enum verdict instance_set_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
-                                const double *values);
-enum verdict instance_get_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
-                                double *values);
+DOOR enum verdict instance_set_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
+                                     const double *values);
+DOOR enum verdict instance_get_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
+                                     double *values);
 
 /* ---- exchange.c: model exchange. From initialization it goes to event mode, from there to and fro between that and
    continuous-time mode. What is read follows states, inputs and parameters at once. Its one event is a warning. */
-enum verdict instance_enter_event_mode(struct instance *instance);
-enum verdict instance_enter_continuous_time(struct instance *instance);
-enum verdict instance_update_discrete_states(struct instance *instance);
+DOOR enum verdict instance_enter_event_mode(struct instance *instance);
+DOOR enum verdict instance_enter_continuous_time(struct instance *instance);
+DOOR enum verdict instance_update_discrete_states(struct instance *instance);
 /* An event is needed where there is something to warn of: `warnings` is discrete, so it changes in event mode alone. */
-enum verdict instance_complete_integrator_step(struct instance *instance, bool *event_needed);
-enum verdict instance_set_time(struct instance *instance, double time);
+DOOR enum verdict instance_complete_integrator_step(struct instance *instance, bool *event_needed);
+DOOR enum verdict instance_set_time(struct instance *instance, double time);
 /* In the order of STATES; refused where `n` is not STATE_COUNT. */
-enum verdict instance_set_states(struct instance *instance, const double *values, size_t n);
-enum verdict instance_get_states(struct instance *instance, double *values, size_t n);
-enum verdict instance_get_derivatives(struct instance *instance, double *values, size_t n);
-enum verdict instance_get_nominals(struct instance *instance, double *values, size_t n);
+DOOR enum verdict instance_set_states(struct instance *instance, const double *values, size_t n);
+DOOR enum verdict instance_get_states(struct instance *instance, double *values, size_t n);
+DOOR enum verdict instance_get_derivatives(struct instance *instance, double *values, size_t n);
+DOOR enum verdict instance_get_nominals(struct instance *instance, double *values, size_t n);
 /* There are none. */
-enum verdict instance_get_event_indicators(struct instance *instance, size_t n);
+DOOR enum verdict instance_get_event_indicators(struct instance *instance, size_t n);
 
 /* ---- partials.c: the partial derivatives, for either use, from initialization mode on, where what is read stands: in
    co-simulation with the controls of the last step. In initialization mode of what is calculated then (ROWS), with
@@ -145,19 +155,20 @@ enum verdict instance_get_event_indicators(struct instance *instance, size_t n);
    states and inputs. Refused: an unknown or a known that is none of these, what is no finite number, accelerations of a
    craft at rest on ground that rubs. A value for each unknown: the sum over the knowns of seed * d(unknown)/d(known);
    the adjoint ones: for each known, over the unknowns. */
-enum verdict instance_directional_derivatives(struct instance *instance, const unsigned *unknowns, size_t n_unknowns,
-                                              const unsigned *knowns, size_t n_knowns, const double *seeds,
-                                              double *values);
-enum verdict instance_adjoint_derivatives(struct instance *instance, const unsigned *unknowns, size_t n_unknowns,
-                                          const unsigned *knowns, size_t n_knowns, const double *seeds,
-                                          double *values);
+DOOR enum verdict instance_directional_derivatives(struct instance *instance, const unsigned *unknowns,
+                                                   size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
+                                                   const double *seeds, double *values);
+DOOR enum verdict instance_adjoint_derivatives(struct instance *instance, const unsigned *unknowns, size_t n_unknowns,
+                                               const unsigned *knowns, size_t n_knowns, const double *seeds,
+                                               double *values);
 
 /* ---- serialize.c: the same bytes on every platform. */
-enum verdict instance_serialized_size(size_t *size);
+DOOR enum verdict instance_serialized_size(size_t *size);
 /* Refused: less than that. */
-enum verdict instance_serialize(struct instance *instance, const struct content *content, unsigned char *bytes,
-                                size_t size);
+DOOR enum verdict instance_serialize(struct instance *instance, const struct content *content, unsigned char *bytes,
+                                     size_t size);
 /* A state in memory of its own. Refused: bytes that are not complete and unchanged, or of another build. */
-enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size, void **state);
+DOOR enum verdict instance_deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
+                                       void **state);
 
 #endif

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "logarithm.h"
+#include "root.h"
 #include "trig.h"
 
 /* Without it a compiler calls what a sub-step is made of, and keeps its numbers in memory meanwhile. */
@@ -223,7 +224,7 @@ static inline void steer_at(struct load_function *f, double time)
 struct friction_radius kernel_friction_radius(const struct craft *craft)
 {
     const double length = craft->length, width = craft->width;
-    const double d = sqrt(length * length + width * width);
+    const double d = square_root(length * length + width * width);
     const double along = length * length / width * natural_logarithm((width + d) / length);
     const double across = width * width / length * natural_logarithm((length + d) / width);
     return (struct friction_radius){d / 6.0 + (along + across) / 12.0, d, along, across};
@@ -283,13 +284,13 @@ static ALWAYS_INLINE struct air air_at(const struct load_function *f, enum drag_
     air.u = c * vx + s * vy;
     air.w = c * vy - s * vx + yaw_rate * f->x_d;
     air.q = kind == ANY_DRAG && f->directional ? f->ahead * fabs(air.u) + f->abeam * fabs(air.w)
-                                               : sqrt(air.u * air.u + air.w * air.w);
+                                               : square_root(air.u * air.u + air.w * air.w);
     return air;
 }
 
 static double slip_speed(double vx, double vy, double turning)
 {
-    return sqrt(vx * vx + vy * vy + turning * turning);
+    return square_root(vx * vx + vy * vy + turning * turning);
 }
 
 /* For a kind, and a sliding, that the compiler may know. */
@@ -354,12 +355,12 @@ static void rub(const struct friction *friction, double *vx, double *vy, double 
         *vx = *vy = *yaw_rate = 0.0;
         return;
     }
-    double q = larger(sqrt(straight + turned) - larger(a, b), 0.0);
+    double q = larger(square_root(straight + turned) - larger(a, b), 0.0);
     for (int i = 0; i < NEWTON; i++) {
         const double of_v = q + a, of_r = q + b;
         const double part_v = straight / (of_v * of_v), part_r = turned / (of_r * of_r);
         const double size = part_v + part_r;
-        const double new = q + size * (sqrt(size) - 1.0) / (part_v / of_v + part_r / of_r);
+        const double new = q + size * (square_root(size) - 1.0) / (part_v / of_v + part_r / of_r);
         if (!(new > q))
             break;
         q = new;
@@ -719,7 +720,7 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
         const double error = slides ? dormand_prince(&f, time, y, h, stages, new)
                                     : near_rest(&f, time, y, h, &stages[STAGES - 1], new);
         if (!(error <= tolerance)) {
-            proposed = error < INFINITY ? h * larger(0.2, 0.9 * sqrt(sqrt(tolerance / error))) : 0.2 * h;
+            proposed = error < INFINITY ? h * larger(0.2, 0.9 * square_root(square_root(tolerance / error))) : 0.2 * h;
             if (proposed < MIN_STEP) {
                 stretch->substep = proposed;
                 return STEP_TOO_SMALL;
@@ -736,7 +737,7 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
         most = larger(most, h * stages[0].kq);
         fastest = larger(fastest, h * fabs(y[YAW_RATE]));
         if (!last) /* a step cut short by the end says nothing against the one proposed */
-            proposed = h * smaller(5.0, error > 0.0 ? 0.9 * sqrt(sqrt(tolerance / error)) : 5.0);
+            proposed = h * smaller(5.0, error > 0.0 ? 0.9 * square_root(square_root(tolerance / error)) : 5.0);
     }
     *stretch = (struct stretch){
         .state = state_of(y),

@@ -10,6 +10,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "hidden.h"
+
 enum drag_area { CONSTANT = 1, DIRECTIONAL };
 
 /* Constants of one craft, in the order of craft.py; the caller has checked them. */
@@ -95,22 +97,23 @@ struct friction_radius {
     double radius, diagonal, along, across;
 };
 
-struct derived kernel_derived(const struct craft *craft);
-struct friction_radius kernel_friction_radius(const struct craft *craft);
+HIDDEN struct derived kernel_derived(const struct craft *craft);
+HIDDEN struct friction_radius kernel_friction_radius(const struct craft *craft);
 
-struct controls kernel_saturate(const struct controls *controls, const struct craft *craft);
-struct controls kernel_controls_at(const struct drive *drive, double time);
+HIDDEN struct controls kernel_saturate(const struct controls *controls, const struct craft *craft);
+HIDDEN struct controls kernel_controls_at(const struct drive *drive, double time);
 /* Side force [N] of both bow thrusters, after saturation. */
-double kernel_steering(const struct controls *controls, const struct craft *craft);
-struct loads kernel_loads_on(const struct state *state, const struct controls *controls, const struct craft *craft);
+HIDDEN double kernel_steering(const struct controls *controls, const struct craft *craft);
+HIDDEN struct loads kernel_loads_on(const struct state *state, const struct controls *controls,
+                                    const struct craft *craft);
 /* Surge and sway [m/s]. */
-void kernel_body_velocity(const struct state *state, double *surge, double *sway);
-double kernel_stability_number(double drag, double rotation, const struct craft *craft);
+HIDDEN void kernel_body_velocity(const struct state *state, double *surge, double *sway);
+HIDDEN double kernel_stability_number(double drag, double rotation, const struct craft *craft);
 
 /* The state one communication step [s], greater than 0, later. `proposed` [s] is what the last stretch of the adaptive
    method returned, 0 at the start. */
-enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
-                     double communication_step, const struct settings *settings, double proposed,
-                     struct stretch *stretch);
+HIDDEN enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
+                                   double communication_step, const struct settings *settings, double proposed,
+                                   struct stretch *stretch);
 
 #endif

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "root.h"
 #include "trig.h"
 
 /* Below each number of the craft is differentiated by hand. */
@@ -39,7 +40,7 @@ static double slope(double value, double low, double high)
 static void drag_at(struct point *p)
 {
     const double k = p->derived.drag_factor, ahead = p->derived.drag_factor_ahead, abeam = p->derived.drag_factor_abeam;
-    p->q = sqrt(p->u * p->u + p->w * p->w);
+    p->q = square_root(p->u * p->u + p->w * p->w);
     if (p->craft->drag_area == DIRECTIONAL) {
         p->kq = ahead * fabs(p->u) + abeam * fabs(p->w);
         p->kq_u = ahead * sign(p->u);
@@ -54,7 +55,7 @@ static void drag_at(struct point *p)
 /* The slip [m/s] of a motion over the ground, or of the one that an acceleration begins; its direction is kept. */
 static double slip_at(struct point *p, double x, double y, double turning)
 {
-    const double slip = sqrt(x * x + y * y + turning * turning);
+    const double slip = square_root(x * x + y * y + turning * turning);
     p->slip_x = slip > 0.0 ? x / slip : 0.0;
     p->slip_y = slip > 0.0 ? y / slip : 0.0;
     p->slip_r = slip > 0.0 ? turning / slip : 0.0;
@@ -193,7 +194,7 @@ static void parameters_at(struct point p, struct linearization *linearization)
 static void motion_at(const struct point *p, struct linearization *linearization)
 {
     const struct state *state = p->state;
-    const double speed = sqrt(state->vx * state->vx + state->vy * state->vy);
+    const double speed = square_root(state->vx * state->vx + state->vy * state->vy);
     const double surge = p->c * state->vx + p->s * state->vy, sway = p->c * state->vy - p->s * state->vx;
     double (*of)[INITIAL_KNOWN_COUNT] = linearization->of;
     of[ROW_BODY_SURGE][KNOWN_POSE_HEADING] = sway;

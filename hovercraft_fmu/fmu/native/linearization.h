@@ -3,6 +3,7 @@
 #ifndef HOVERCRAFT_LINEARIZATION_H
 #define HOVERCRAFT_LINEARIZATION_H
 
+#include "hidden.h"
 #include "variables.h"
 
 /* d(ROWS)/d(KNOWNS). */
@@ -16,7 +17,7 @@ struct linearization {
    drag's area is directional, air that comes from right ahead or right abeam. Friction can only grow from none: its
    slope is that of the motion, or, at rest, of the one that begins. With friction a craft must slide to have slopes of
    its accelerations. */
-void kernel_linearize(const struct state *state, const struct controls *controls, const struct craft *craft,
-                      bool parameters, struct linearization *linearization);
+HIDDEN void kernel_linearize(const struct state *state, const struct controls *controls, const struct craft *craft,
+                             bool parameters, struct linearization *linearization);
 
 #endif

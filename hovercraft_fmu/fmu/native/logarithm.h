@@ -3,7 +3,9 @@
 #ifndef HOVERCRAFT_LOGARITHM_H
 #define HOVERCRAFT_LOGARITHM_H
 
+#include "hidden.h"
+
 /* Of a number greater than 0, within one unit in the last place. */
-double logarithm_of(double x);
+HIDDEN double logarithm_of(double x);
 
 #endif

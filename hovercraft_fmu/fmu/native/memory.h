@@ -5,8 +5,10 @@
 
 #include <stddef.h>
 
+#include "hidden.h"
+
 /* As calloc and free. */
-void *memory_allocate(size_t count, size_t size);
-void memory_release(void *memory);
+HIDDEN void *memory_allocate(size_t count, size_t size);
+HIDDEN void memory_release(void *memory);
 
 #endif

@@ -5,6 +5,8 @@
 
 #include <stdbool.h>
 
+#include "hidden.h"
+
 struct instance;
 
 enum call {
@@ -54,10 +56,10 @@ enum call {
 
 /* Whether a call may be made now; said, where not. `given`: no argument is NULL that must not be. Without an instance
    it may not. */
-bool permitted(struct instance *instance, enum call call, bool given);
+HIDDEN bool permitted(struct instance *instance, enum call call, bool given);
 /* Of a call that is not in the table: it may be made in every state. */
-bool permitted_always(struct instance *instance, const char *name, bool given);
+HIDDEN bool permitted_always(struct instance *instance, const char *name, bool given);
 /* As the standard of the instance has it. */
-const char *call_name(const struct instance *instance, enum call call);
+HIDDEN const char *call_name(const struct instance *instance, enum call call);
 
 #endif

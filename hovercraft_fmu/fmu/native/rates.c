@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "root.h"
+
 static enum verdict check_order(struct instance *instance, unsigned reference, int order)
 {
     if (order == 1)
@@ -65,7 +67,7 @@ static bool output_rate(const double *reals, unsigned reference, double *rate)
         *rate = sideways - r * reals[V_BODY_SURGE];
         return true;
     case V_SPEED: /* at rest it can only grow */
-        *rate = speed > 0.0 ? (vx / speed) * ax + (vy / speed) * ay : sqrt(ax * ax + ay * ay);
+        *rate = speed > 0.0 ? (vx / speed) * ax + (vy / speed) * ay : square_root(ax * ax + ay * ay);
         return true;
     default:
         return false;

@@ -6,6 +6,8 @@
 #include <stdarg.h>
 #include <stddef.h>
 
+#include "hidden.h"
+
 enum { TEXT_SIZE = 640 };
 
 /* Writes `format` into TEXT_SIZE characters; what does not fit is cut off. It knows
@@ -15,6 +17,6 @@ enum { TEXT_SIZE = 640 };
      %4  double, four significant digits, as printf's %.4g;  %3  three
      %i  long long;  %u  unsigned long long
    and no message contains a '%', which a host's logger would take for a format. */
-void text_format(char into[TEXT_SIZE], const char *format, va_list values);
+HIDDEN void text_format(char into[TEXT_SIZE], const char *format, va_list values);
 
 #endif

@@ -80,7 +80,7 @@ static const double HALF_PI[] = {
 enum { TERMS = 4, ROOM = 20 }; /* fdlibm's jk for 53 bits; its size of the working arrays */
 
 /* x * 2^n, exact: fdlibm asks for |n| below 600 only. */
-static double scaled(double x, int n)
+static double times_power_of_two(double x, int n)
 {
     return x * from_bits((uint64_t)(0x3ff + n) << 52);
 }
@@ -128,7 +128,7 @@ static int complemented(int32_t *iq, int jz, int q0)
 /* The sum of iq[0..jz] * 2^(q0 - 24*(jz - i)) times pi/2, as y[0] + y[1]; negative where `negative`. */
 static void times_half_pi(const int32_t *iq, int jz, int q0, int negative, double y[2])
 {
-    double q[ROOM], fq[ROOM] = {0.0}, power = scaled(1.0, q0), sum = 0.0;
+    double q[ROOM], fq[ROOM] = {0.0}, power = times_power_of_two(1.0, q0), sum = 0.0;
     for (int i = jz; i >= 0; i--) {
         q[i] = power * (double)iq[i];
         power *= 0x1p-24;
@@ -162,7 +162,7 @@ static int reduce_parts(const double *x, double y[2], int e0, int nx)
     for (;;) {
         int32_t any = 0;
         int more = 1;
-        z = scaled(distilled(q, iq, jz), q0);
+        z = times_power_of_two(distilled(q, iq, jz), q0);
         z -= 8.0 * (double)(int64_t)(z * 0.125); /* trim off what is a multiple of 8 */
         n = (int)z;
         z -= (double)n;
@@ -183,7 +183,7 @@ static int reduce_parts(const double *x, double y[2], int e0, int nx)
             if (half == 2) {
                 z = 1.0 - z;
                 if (carry)
-                    z -= scaled(1.0, q0);
+                    z -= times_power_of_two(1.0, q0);
             }
         }
         if (z != 0.0)
@@ -206,7 +206,7 @@ static int reduce_parts(const double *x, double y[2], int e0, int nx)
             q0 -= 24;
         } while (iq[jz] == 0);
     } else {
-        z = scaled(z, -q0);
+        z = times_power_of_two(z, -q0);
         if (z >= 0x1p24) {
             const double high = (double)(int32_t)(0x1p-24 * z);
             iq[jz] = (int32_t)(z - 0x1p24 * high);

@@ -25,6 +25,8 @@
 
 #include <math.h>
 
+#include "hidden.h"
+
 struct trig_pair {
     double sine, cosine;
 };
@@ -38,9 +40,9 @@ struct trig_turn {
 
 /* Not in line, for what is rare: another quarter turn; an angle very close to a multiple of pi/2; one that is large,
    infinite or no number. */
-void trig_turn_to(struct trig_turn *turn, double quarters);
-struct trig_pair trig_near_multiple(double angle);
-struct trig_pair trig_large(double angle);
+HIDDEN void trig_turn_to(struct trig_turn *turn, double quarters);
+HIDDEN struct trig_pair trig_near_multiple(double angle);
+HIDDEN struct trig_pair trig_large(double angle);
 
 static const double TRIG_QUARTER = 0x1.921fb54442d18p-1;    /* pi/4 */
 static const double TRIG_LARGE = 0x1.921fbp+20;            /* 2^20*pi/2, above it all bits of 2/pi count */

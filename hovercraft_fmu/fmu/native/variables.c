@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "root.h"
+
 static enum verdict check_finite(struct instance *instance, const unsigned *references, unsigned n)
 {
     for (unsigned i = 0; i < n; i++)
@@ -21,7 +23,7 @@ enum verdict instance_observe_motion(struct instance *instance)
         return REFUSED;
     const struct state *s = &now->state;
     kernel_body_velocity(s, &reals[V_BODY_SURGE], &reals[V_BODY_SWAY]);
-    reals[V_SPEED] = sqrt(s->vx * s->vx + s->vy * s->vy);
+    reals[V_SPEED] = square_root(s->vx * s->vx + s->vy * s->vy);
     if (check_finite(instance, MOTION, MOTION_COUNT) == REFUSED)
         return REFUSED;
     instance_spread(reals, s, STATES, STATE_COUNT);
