@@ -138,8 +138,8 @@ class Findings:
 def text(frame: pl.DataFrame) -> str:
     """A table in Markdown; numbers with three digits."""
     cells = {name: [_cell(value) for value in frame[name]] for name in frame.columns}
-    with pl.Config(tbl_formatting="MARKDOWN", tbl_hide_column_data_types=True, tbl_hide_dataframe_shape=True,
-                   tbl_rows=-1, tbl_cols=-1, tbl_width_chars=-1, fmt_str_lengths=1000):  # fmt: skip
+    with pl.Config(tbl_formatting="ASCII_MARKDOWN", tbl_hide_column_data_types=True, tbl_hide_dataframe_shape=True,
+                   tbl_rows=-1, tbl_cols=-1, tbl_width_chars=10_000, fmt_str_lengths=1000):  # fmt: skip
         return str(pl.DataFrame(cells)).strip()
 
 
