@@ -11,7 +11,7 @@ import hovercraft_fmu
 from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.host.messages import plain
 from hovercraft_fmu.scenes import SCENES, signals
-from hovercraft_fmu.simulation import plan, read_inputs, run_fmu, run_model
+from hovercraft_fmu.simulation import plan, run_fmu, run_model
 from tests.conftest import FMI_2
 
 
@@ -71,26 +71,6 @@ def test_a_csv_file_holds_every_bit(fmu: Path, tmp_path: Path) -> None:
     back = fmpy.util.read_csv(result.write_csv(tmp_path / "new" / "turn.csv"))
     assert back.dtype.names == result.names
     assert all(np.array_equal(back[name], result[name]) for name in result.names)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "must be a CSV file"),
-        ("time,thrust\n", "must be a CSV file"),
-        ("time,thrust\n0,1\n1\n", "must be a CSV file"),
-        ("time,thrust\n0,five\n", "must be a CSV file"),
-        ("thrust,time\n0,1\n", "the first column must be 'time'"),
-        ("time,mass\n0,1\n", "column 'mass' must be an input: thrust, port_thruster, starboard_thruster"),
-        ("time,thrust\n0,1\n1,nan\n", "thrust = nan in row 2: must be a finite number"),
-        ("time,thrust\n0,1\n2,1\n1,1\n", "time = 1.0 in row 3: must not go back"),
-    ],
-)
-def test_bad_control_logs(tmp_path: Path, text: str, message: str) -> None:
-    path = write(tmp_path / "bad.csv", text)
-    with pytest.raises(ValueError, match=r"bad\.csv") as caught:
-        read_inputs(path)
-    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -1,29 +1,147 @@
-"""Control logs: the inputs of a run over time, read and checked."""
+"""Reads a control log as people and their tools write it: CSV where there is one meaning, else a refusal that names it.
 
+The standard library's `csv` splits the lines. What separates the columns is told by the header, whose names are known:
+no guess from the content is needed.
+"""
+
+import codecs
+import csv
+import math
 import os
-from math import isfinite
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple, NoReturn
 
-import fmpy
-import fmpy.simulation
-import fmpy.util
 import numpy as np
 
-from ..fmu.interface import INPUTS
+from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
 from ..scenes import Signals
+
+TIME = "time"
+SHOWN = tuple(each.name for each in VARIABLES if each.causality in ("input", "output", "local"))
+"""Columns of a result, but for the time."""
+SEPARATORS = (";", "\t", ",")
+"""In the order in which they are looked for: with the first two a comma may be the decimal one."""
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
+NAME = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])])?")
+"""Of a column: `thrust`, `time [s]`, `wind.x (m/s)`."""
+
+
+class Line(NamedTuple):
+    """A line of the file that has something in it."""
+
+    number: int
+    """As an editor counts them, from 1."""
+    cells: list[str]
 
 
 def read_inputs(path: str | os.PathLike[str]) -> Signals:
-    """Read a control log: a CSV file in fmpy's format, with the columns `time` and names of inputs.
+    """Read a control log: columns `time` [s] and names of inputs; linear between rows, two rows at one time are a jump.
+
+    Taken where there is one meaning: a byte order mark, blank lines, comment lines with #, spaces, quotes, a comma
+    at the end of lines, semicolon or tab between columns, and with these a decimal comma; capitals and units in names
+    (`Time [s]`). Columns of outputs and local variables, which a result has, are passed over.
+
+    Returns:
+        A structured array with the field `time` and those inputs that there are, in the order of the file, shape (n,).
 
     Raises:
         FileNotFoundError: no such file.
-        ValueError: names the file and what is wrong in it.
+        ValueError: names the file, and the line, column, value and rule.
     """
+    source = Path(path)
+    header, *rows = list(_lines(source, _text(source))) or [Line(1, [])]
+    if not rows:
+        raise ValueError(f"{source}: must have a header and at least one row of numbers")
+    while not header.cells[-1]:  # a separator at the end of the line
+        header.cells.pop()
+    names = _names(source, header)
+    _check_lengths(source, len(header.cells), rows)
+    columns = {name: _numbers(source, name, i, rows) for i, name in names.items()}
+    _check_order(source, columns[TIME], rows)
+    order = (TIME, *(name for name in columns if name != TIME))
+    table = np.empty(len(rows), dtype=[(name, np.float64) for name in order])
+    for name in order:
+        table[name] = columns[name]
+    return table
+
+
+def _text(source: Path) -> str:
+    content = source.read_bytes()
+    encoding = "utf-16" if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
     try:
-        table = fmpy.util.read_csv(path)
-    except (ValueError, IndexError) as error:
-        raise ValueError(f"{path}: must be a CSV file with a header and rows of as many numbers; {error}") from error
-    return checked_signals(table, str(path))
+        text = content.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{source}: must be text in UTF-8; byte {error.start} is not") from error
+    if "\0" in text:
+        raise ValueError(f"{source}: must be text; it has bytes of 0 in it")
+    return text
+
+
+def _lines(source: Path, text: str) -> Iterator[Line]:
+    """The header and the rows, without blank lines and comments."""
+    separator = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        if line.count('"') % 2:
+            _refuse(source, number, "a quote that is opened must be closed on its line")
+        separator = separator or next((each for each in SEPARATORS if each in line), ",")
+        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+        if separator != ",":  # then a comma is the decimal one
+            cells = [cell.replace(",", ".") if COMMA.fullmatch(cell) else cell for cell in cells]
+        if any(cells):
+            yield Line(number, cells)
+
+
+def _names(source: Path, header: Line) -> dict[int, str]:
+    """Place -> name of the columns to be read."""
+    names: dict[int, str] = {}
+    known = {each.lower(): each for each in (TIME, *SHOWN)}
+    for i, cell in enumerate(header.cells):
+        found = NAME.fullmatch(cell)
+        name = known.get(found["name"].lower()) if found else None
+        if name is None:
+            _refuse(source, header.number, f"column {cell!r}: must be 'time' or an input: {', '.join(INPUTS)}")
+        unit = "s" if name == TIME else BY_NAME[name].unit or ""
+        if found and found["unit"] not in (None, unit) and (name == TIME or name in INPUTS):
+            _refuse(source, header.number, f"column {cell!r}: must be in {unit!r}")
+        if name in names.values():
+            _refuse(source, header.number, f"column {cell!r}: must stand there once")
+        if name == TIME or name in INPUTS:
+            names[i] = name
+    if TIME not in names.values():
+        _refuse(source, header.number, "there must be a column 'time'")
+    return names
+
+
+def _check_lengths(source: Path, width: int, rows: Sequence[Line]) -> None:
+    for line in rows:
+        if len(line.cells) < width or any(line.cells[width:]):
+            _refuse(source, line.number, f"must have {width} values, as the header has names; it has {len(line.cells)}")
+
+
+def _numbers(source: Path, name: str, place: int, rows: Sequence[Line]) -> list[float]:
+    return [_number(source, line, name, line.cells[place] if place < len(line.cells) else "") for line in rows]
+
+
+def _number(source: Path, line: Line, name: str, cell: str) -> float:
+    value = float(cell) if NUMBER.fullmatch(cell) else math.nan
+    if not math.isfinite(value):
+        _refuse(source, line.number, f"{name} = {cell!r}: must be a finite number")
+    return value
+
+
+def _check_order(source: Path, times: Sequence[float], rows: Sequence[Line]) -> None:
+    for i in range(1, len(times)):
+        if times[i] < times[i - 1]:
+            _refuse(source, rows[i].number, f"time = {times[i]!r}: must not go back; before it is {times[i - 1]!r}")
+
+
+def _refuse(source: Path, line: int, what: str) -> NoReturn:
+    raise ValueError(f"{source}, line {line}: {what}")
 
 
 def checked_signals(table: Signals, source: str) -> Signals:
@@ -36,7 +154,7 @@ def checked_signals(table: Signals, source: str) -> Signals:
             raise ValueError(f"{source}: column {name!r} must be an input: {', '.join(INPUTS)}")
     for name in names:
         for row, value in enumerate(table[name], 1):
-            if not isfinite(value):
+            if not math.isfinite(value):
                 raise ValueError(f"{source}: {name} = {value} in row {row}: must be a finite number")
     back = np.flatnonzero(np.diff(table["time"]) < 0.0)
     if back.size:
