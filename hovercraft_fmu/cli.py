@@ -316,7 +316,7 @@ def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 
 @click.argument("study")
 @of_an_fmu
 @click.option("--engine", metavar="NAME", default="fmu", show_default=True,
-              help="fmu, or batch: the bare model, all craft at once (fixed-step integrators).")  # fmt: skip
+              help="fmu, or batch: the compiled kernel, all craft at once, with the native FMU's bits.")  # fmt: skip
 @click.option("--workers", type=int, metavar="N", help="Processes on this machine. Default: one a processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
 @click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Default: build/sweep/ and the study.")

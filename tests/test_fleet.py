@@ -123,8 +123,8 @@ def test_neighbours_change_nothing(method: str) -> None:
         np.testing.assert_array_equal(alone.states[:, 0], mixed.states[:, i])
         if i % 5 != 2 and i % 7 != 3 and i != 11:
             np.testing.assert_array_equal(whole.states[:, i], mixed.states[:, i])
-    assert mixed.refused[11] == "heading = nan: must be a finite number"
-    assert "must stay a finite number" in mixed.refused[3]
+    assert str(mixed.refused[11]) == "heading = nan: must be a finite number"
+    assert "must stay a finite number" in str(mixed.refused[3])
     assert mixed.states[3, 3] == 1e200
 
 
@@ -185,15 +185,13 @@ def test_what_does_not_fit_is_named(change: dict[str, Any], says: str) -> None:
         ({"mass": [1.0, -2.0, 3.0]}, "craft 1: mass = -2.0: must be greater than 0"),
         ({"drag_area": [1, 1.5]}, "craft 1: drag_area = 1.5: must be one of 1 (constant), 2 (directional)"),
         ({"thrust_min": [0.0, 20.0]}, "craft 1: thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"),
-        ({"air_density": [1.0, 1e300], "length": 1e10}, "craft 0: spin_drag_factor = "),
+        ({"air_density": [1.0, 1e308]}, "craft 1: drag_factor = inf kg/m: must be a finite number"),
         ({"mass": math.nan}, "mass = nan: must be a finite number"),
         ({"weight": 1.0}, "weight: must be a parameter of a craft: mass, "),
         ({"mass": [1.0, 2.0], "inertia": [1.0, 2.0, 3.0]}, "mass: shape (2,): must be (3,)"),
     ],
 )
 def test_craft_that_cannot_be(parameters: dict[str, Any], says: str) -> None:
-    if "air_density" in parameters:
-        says = "craft 1: drag_factor = inf kg/m: must be a finite number"
     with pytest.raises(ValueError, match=r"must be|must not") as caught:
         Crafts(**parameters)
     assert str(caught.value).startswith(says)
@@ -215,7 +213,7 @@ def test_each_refusal_has_its_reason(name: str) -> None:
     step = np.array([0.1, change.get("step", 0.1)])
     slopes = Controls(0.0)._replace(thrust=np.array([0.0, change.get("slope", 0.0)]))  # type: ignore[arg-type]
     found = advance_fleet(State(vx=1.0), Controls(), Crafts(mass=[100.0, 101.0]), step, way, slopes)
-    assert found.refused[1].startswith(says)
+    assert str(found.refused[1]).startswith(says)
     assert tuple(found.states[:, 1]) == State(vx=1.0)
 
 

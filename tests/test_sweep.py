@@ -44,7 +44,6 @@ from hovercraft_fmu.sweep.study import Factor
 from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
 from tests.conftest import ROOT
 
-FIXED_STEP = [method.name for method in INTEGRATORS if method.integrate]
 COARSE = {"integrator": "rk4", "step_size": 0.1}
 MASSES: dict[str, Any] = {
     "scene": "turn",
@@ -182,46 +181,39 @@ def test_the_order_of_runs_changes_no_bit(each_fmu: Path) -> None:
 # ---- the batch
 
 
-@pytest.mark.parametrize("scene", ["turn", "slalom", "crosswind"])
-def test_the_batch_is_within_1e_12_of_the_fmu(scene: str, fmu: Path, tmp_path: Path) -> None:
-    """Every method and both areas at once, all that can be kept, at every communication point."""
+@pytest.mark.parametrize(
+    ("scene", "sweeps"),
+    [
+        ("turn", {"mass": [60.0, 170.0], "drag_area": [1, 2], "rotational_drag": [0.0, 0.5]}),
+        ("slalom", {"mass": [60.0, 170.0], "step_size": [0.02, 0.013], "drag_coefficient": [0.0, 1.25]}),
+        ("crosswind", {"thrust_max": [7.0, 12.0], "wind.x": [0.0, 0.3], "velocity.yaw_rate": [-9.0, 0.1]}),
+        ("drift_to_rest", {"skirt_friction": [0.0, 0.002, 0.008], "wind.y": [0.0, 0.3]}),
+    ],
+)
+@pytest.mark.usefixtures("fleet")
+def test_the_batch_has_the_rows_of_the_native_fmu(
+    scene: str, sweeps: dict[str, Any], native_fmu: Path, tmp_path: Path
+) -> None:
+    """Bit by bit: every method at once, all that can be kept, at every communication point, and only at the end."""
     study = {
         "scene": scene,
         "stop_time": 15.0,
         "set": {"step_size": 0.02},
-        "sweep": {"mass": [60.0, 170.0], "integrator": FIXED_STEP, "drag_area": [1, 2], "rotational_drag": [0.0, 0.5]},
+        "sweep": {"integrator": [method.name for method in INTEGRATORS], **sweeps},
         "keep": {
             "end": [*OBSERVED, *DERIVED],
             "trajectory": {"every": 0.1, "of": list(OBSERVED)},
             "events": {"moves": {"of": "speed", "above": 0.1, "values": ["pose.x"]}},
         },
     }
-    sweep(study, fmu, workers=1, output=tmp_path / "fmu")
-    sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
-    for what in ("runs", "trajectories"):
-        ours, theirs = load(tmp_path / "batch", what), load(tmp_path / "fmu", what)
-        assert ours.num_rows == theirs.num_rows
-        for name in theirs.column_names:
-            if pa.types.is_floating(theirs[name].type):
-                found, expected = (each[name].to_numpy() for each in (ours, theirs))
-                assert np.all(np.abs(found - expected) <= 1e-12 * np.maximum(1.0, np.abs(expected))), name
-            else:
-                assert ours[name].equals(theirs[name]), name
-
-
-def test_a_batch_with_friction_comes_to_rest(fmu: Path, tmp_path: Path) -> None:
-    """At and near rest the size of a step is decided anew in every step: held to 1e-9 there."""
-    study = {
-        "scene": "drift_to_rest",
-        "set": {"step_size": 0.05, "integrator": "rk4"},
-        "sweep": {"skirt_friction": [0.0, 0.002, 0.008], "wind.y": [0.0, 0.3]},
-        "keep": {"end": ["pose.x", "pose.y", "pose.heading", "speed"], "maximum": ["speed"], "distance": True},
-    }
-    sweep(study, fmu, workers=1, output=tmp_path / "fmu")
-    sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
-    ours, theirs = load(tmp_path / "batch"), load(tmp_path / "fmu")
-    for name in theirs.column_names[3:-2]:
-        assert ours[name].to_numpy() == pytest.approx(theirs[name].to_numpy(), rel=1e-9, abs=1e-9)
+    if "step_size" in sweeps:
+        study["set"] = {}
+    for name, keep in (("all", study["keep"]), ("end", {"end": ["pose.x"]})):
+        sweep(study | {"keep": keep}, native_fmu, workers=1, output=tmp_path / f"{name} fmu")
+        sweep(study | {"keep": keep}, engine="batch", workers=1, output=tmp_path / f"{name} batch")
+        assert bits(load(tmp_path / f"{name} batch")).equals(bits(load(tmp_path / f"{name} fmu")))
+    ours, theirs = (load(tmp_path / f"all {engine}", "trajectories") for engine in ("batch", "fmu"))
+    assert bits(ours).equals(bits(theirs))
 
 
 def test_a_failed_craft_of_a_batch_leaves_the_others(tmp_path: Path) -> None:
@@ -250,12 +242,6 @@ def test_the_batch_warns_as_the_fmu_does(fmu: Path, tmp_path: Path) -> None:
     assert len(set(theirs)) > 3
     assert any(each & STEP_UNSTABLE for each in theirs)
     assert outcome.warned == sum(each != 0 for each in theirs)
-
-
-def test_adaptive_cannot_go_as_a_batch() -> None:
-    for study in (but(set={"integrator": "adaptive"}), but(sweep={"integrator": ["rk4", "adaptive"]}, set={})):
-        with pytest.raises(ValueError, match="integrator = 'adaptive': must be another one with the engine batch"):
-            sweep(study, engine="batch")
 
 
 # ---- what is kept, and what is swept

@@ -38,8 +38,8 @@ class Fleet(NamedTuple):
     """rad, shape (craft,): the largest turn in a sub-step, there too."""
     proposed: Array
     """s, shape (craft,): for the next call with the adaptive method."""
-    refused: dict[int, str]
-    """Number of a craft -> why it was refused."""
+    refused: dict[int, Exception]
+    """Number of a craft -> why it was refused: what the model would raise."""
 
 
 class Crafts:
@@ -63,7 +63,9 @@ class Crafts:
         self.count = count if lengths else None
         """How many; None where all numbers are shared, by however many craft there are."""
         self.columns = columns
-        for number, why in refusals(columns, count).items():
+        self.derived = _derived(columns, count)
+        """What is worked out of them: name -> shape (craft,), or (1,)."""
+        for number, why in _refusals(columns, self.derived, count).items():
             raise ValueError(f"craft {number}: {why}" if lengths else why)
 
     @classmethod
@@ -113,7 +115,7 @@ def advance_fleet(
     given = _Given(count, rows, _rows("controls", controls, len(Controls._fields)), chosen, slopes)
     way = [np.asarray(each, float) for each in (communication_step, settings.step_size, settings.tolerance, proposed)]
     structure = _Way(integrator=INTEGRATORS.index(settings.integrator) + 1)
-    _put(structure, "numbers", count, way, _WAY)
+    way = _put(structure, "numbers", count, way, _WAY)
     found = _Found(count)
     _library().fleet_advance(byref(given.structure), byref(structure), byref(found.structure))
     return found.fleet(lambda i: given.numbers(i) | _numbers(_WAY, way, i))
@@ -141,17 +143,22 @@ def refusals(parameters: Mapping[str, Array], count: int) -> dict[int, str]:
         parameters: all of a craft's, of shape (craft,) or ().
         count: how many craft there are.
     """
+    return _refusals(parameters, _derived(parameters, count), count)
+
+
+def _refusals(parameters: Mapping[str, Array], derived: Mapping[str, Array], count: int) -> dict[int, str]:
     doubtful = np.zeros(count, bool)
     for name, column in parameters.items():
         if not _is_right(name, column):
             doubtful |= [not _is_right(name, value) for value in np.broadcast_to(column, count)]
-    doubtful |= ~(parameters["thrust_max"] - parameters["thrust_min"] >= 0.0)
-    doubtful |= _derived(parameters, count) >= 0
+    with np.errstate(invalid="ignore"):
+        doubtful |= ~(parameters["thrust_max"] - parameters["thrust_min"] >= 0.0)
+    doubtful |= ~np.isfinite(list(derived.values())).all(axis=0)
     found = {}
     for i in np.flatnonzero(doubtful).tolist():
-        values: dict[str, Any] = {name: column[i] if column.ndim else column for name, column in parameters.items()}
+        values: Any = {name: (column[i] if column.ndim else column).item() for name, column in parameters.items()}
         try:
-            Craft(**{name: value.item() for name, value in values.items()})
+            Craft(**values)
         except ValueError as error:
             found[i] = str(error)
     return found
@@ -171,14 +178,14 @@ def _is_right(name: str, column: Array) -> bool:
     return True
 
 
-def _derived(parameters: Mapping[str, Array], count: int) -> NDArray[np.int32]:
-    """The first of DERIVED that is not finite, or -1."""
-    found = np.empty(count, np.int32)
+def _derived(parameters: Mapping[str, Array], count: int) -> dict[str, Array]:
+    """The numbers of DERIVED, by name."""
+    found = np.empty((len(DERIVED), count))
     structure = _CFleet(count=count)
-    _put(structure, "constants", count, list(parameters.values()), PARAMETERS)
-    _library().fleet_check(byref(structure), found.ctypes.data)
-    assert found.size == 0 or found.max() < len(DERIVED)
-    return found
+    held = _put(structure, "constants", count, list(parameters.values()), PARAMETERS)
+    _library().fleet_derived(byref(structure), found.ctypes.data)
+    del held  # not before
+    return {name: row for (name, _, _), row in zip(DERIVED, found, strict=True)}
 
 
 # ---- as C has it: native/fleet/fleet.h
@@ -279,7 +286,7 @@ class _Found:
 
     def fleet(self, numbers: Callable[[int], dict[str, float]]) -> Fleet:
         """`numbers` gives those of a craft by name."""
-        refused = {i: str(self._error(i, numbers(i))) for i in np.flatnonzero(self._why).tolist()}
+        refused = {i: self._error(i, numbers(i)) for i in np.flatnonzero(self._why).tolist()}
         drag_mass, rotation, proposed = (self._reals[name] for name in ("drag_mass", "rotation", "proposed"))
         return Fleet(self._states, self._substeps, drag_mass, rotation, proposed, refused)
 
@@ -315,6 +322,6 @@ def _library() -> Any:
         raise NotCompiledError(f"no machine code of HovercraftFleet for {machine}-{system}") from None
     library.fleet_advance.restype = c_int64
     library.fleet_advance.argtypes = (POINTER(_CFleet), POINTER(_Way), POINTER(_CReached))
-    library.fleet_check.argtypes = (POINTER(_CFleet), c_void_p)
+    library.fleet_derived.argtypes = (POINTER(_CFleet), c_void_p)
     library.fleet_observe.argtypes = (POINTER(_CFleet), c_void_p * 2, c_void_p * 3)
     return library

@@ -1,6 +1,7 @@
-"""Makes runs on the bare model, all craft at once."""
+"""Makes runs on the compiled kernel, all craft at once: with the bits of the native FMU."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..fmu.interface import (
     ACTION,
+    COUNTER_STOPPED,
     CRAFT_PARAMETERS,
     HELD,
     INPUT_HELD,
@@ -16,32 +18,28 @@ from ..fmu.interface import (
     STATES,
     STEP_TURNS,
     STEP_UNSTABLE,
+    SUBSTEPS_MAX,
     WATCHED,
 )
-from ..model.craft import Craft
-from ..model.dynamics import Controls, State, saturate
-from ..model.observation import observe_action, observe_motion
-from ..model.subcycling import Settings, advance, stability_number
-from ..simulation import Run
+from ..host.fleet import Array, Crafts, advance_fleet, observe_fleet, refusals
+from ..model.dynamics import Controls, State
+from ..model.subcycling import NonFiniteError, Settings
 from .engines import SETTINGS, Plan, Ran, empty, settings_of
 from .study import Samples
 from .timeline import Leg, merged
 
 
 def run_batch(plan: Plan, samples: Samples) -> Ran:
-    """Make runs on the bare model, all craft with the same settings at once, with the functions of the FMU.
+    """Make runs on the compiled kernel, those with the same settings at once.
 
-    Where a run cannot be made its error is what the model says of that craft alone.
-
-    Raises:
-        ValueError: the adaptive method, whose step is each craft's own.
+    A run that cannot be made has its error, and the others go on.
     """
     ran = empty(plan, len(next(iter(samples.values()))))
-    with np.errstate(all="ignore"):  # what leaves the range of numbers is found at the end
+    with np.errstate(all="ignore"):  # what leaves the range of numbers is found, run by run
         for settings, group in _groups(plan, samples):
             possible = _possible(plan, samples, group, ran)
             if len(possible):
-                _batch(plan, settings, {name: column[possible] for name, column in samples.items()}, possible, ran)
+                _Batch(plan, settings, {name: column[possible] for name, column in samples.items()}, possible, ran).go()
     return ran
 
 
@@ -56,35 +54,23 @@ def _groups(plan: Plan, samples: Samples) -> Iterator[tuple[Settings, NDArray[np
         yield settings_of(dict(zip(SETTINGS, key, strict=True))), np.array(group)
 
 
+def _parameters(plan: Plan, samples: Samples) -> dict[str, Array]:
+    return {name: np.asarray(samples.get(name, plan.run.value(name)), float) for name in CRAFT_PARAMETERS}
+
+
 def _possible(plan: Plan, samples: Samples, group: NDArray[np.int64], ran: Ran) -> NDArray[np.int64]:
     """Those of the group whose craft can be; the errors of the others are noted."""
-    if _refusal(plan.run, {name: column[group] for name, column in samples.items()}) is None:
-        return group
-    for i in group:
-        ran.errors[i] = _refusal(plan.run, {name: column[i].item() for name, column in samples.items()})
-    return np.array([i for i in group if ran.errors[i] is None], np.int64)
+    parameters = _parameters(plan, {name: column[group] for name, column in samples.items()})
+    refused = refusals(parameters, len(group))
+    for i, why in refused.items():
+        ran.errors[group[i]] = why
+    return np.delete(group, list(refused))
 
 
-def _refusal(run: Run, values: Mapping[str, Any]) -> str | None:
-    """Why there cannot be such a craft, or such craft."""
-    try:
-        _craft(run, values)
-    except ValueError as error:
-        return str(error)
-    return None
-
-
-def _batch(plan: Plan, settings: Settings, samples: Samples, group: NDArray[np.int64], ran: Ran) -> None:
-    try:
-        _Batch(plan, settings, samples, group, ran).go()
-    except ValueError as error:  # a sub-step that cannot be, which they share
-        ran.record[group] = np.nan
-        for i in group:
-            ran.errors[i] = str(error)
-
-
-def _craft(run: Run, values: Mapping[str, Any]) -> Craft:
-    return Craft(**{name: values.get(name, run.value(name)) for name in CRAFT_PARAMETERS})
+@lru_cache(maxsize=16)
+def _merged(legs: tuple[Leg, ...], settings: Settings) -> list[Leg]:
+    """The same for every chunk."""
+    return merged(legs, settings)
 
 
 class _Batch:
@@ -92,77 +78,109 @@ class _Batch:
 
     def __init__(self, plan: Plan, settings: Settings, samples: Samples, group: NDArray[np.int64], ran: Ran) -> None:
         self._plan, self._settings, self._samples, self._group, self._ran = plan, settings, samples, group, ran
-        self._craft = _craft(plan.run, samples)
-        everyone = np.ones(len(group))
-        start: list[Any] = [samples.get(name, plan.run.value(name)) * everyone for name in STATES]
-        self._state = State(*start)
-        self._stability: NDArray[np.float64] = np.zeros(len(group))
-        self._rotation: NDArray[np.float64] = np.zeros(len(group))
-        self._held = np.zeros(len(group), bool)
+        count = len(group)
+        self._parameters = _parameters(plan, samples)
+        self._crafts = Crafts(**self._parameters)
+        start = [np.broadcast_to(samples.get(name, plan.run.value(name)), count) for name in STATES]
+        self._states: Array = np.array(start, float)
+        self._proposed, self._stability, self._rotation = np.zeros((3, count))
+        self._substeps, self._held = np.zeros(count, np.int64), np.zeros(count, bool)
+        self._errors: dict[int, str] = {}
 
     def go(self) -> None:
         timeline = self._plan.timeline
         point = 0
         if timeline.start_kept:
-            self._keep(point, self._controls(timeline.start, self._samples))
+            self._keep(point, self._controls(timeline.start))
             point += 1
-        legs = merged(timeline.legs, self._settings)
-        for leg in legs:
-            controls = self._controls(leg.controls, self._samples)
+        for leg in _merged(timeline.legs, self._settings):
+            controls = self._controls(leg.controls)
             self._advance(leg, controls)
             if leg.kept:
                 self._keep(point, controls)
                 point += 1
-        self._finish(legs)
+        self._finish()
 
-    def _controls(self, controls: Controls, values: Mapping[str, Any]) -> Controls:
-        return Controls(*(values.get(name, value) for name, value in zip(INPUTS, controls, strict=True)))
+    def _controls(self, controls: Controls) -> Controls:
+        given: Any = (self._samples.get(name, value) for name, value in zip(INPUTS, controls, strict=True))
+        return Controls(*given)
 
     def _advance(self, leg: Leg, controls: Controls) -> None:
-        stretch = advance(self._state, controls, self._craft, leg.end - leg.time, self._settings, ns=np)
-        self._state = stretch.state
-        number = stability_number(stretch.drag_mass, stretch.rotation, self._craft)
-        # not fmax: what is not a number stays so
+        fleet = advance_fleet(
+            self._states, controls, self._crafts, leg.end - leg.time, self._settings, proposed=self._proposed
+        )
+        self._states, self._proposed = fleet.states, fleet.proposed
+        number = self._stability_number(fleet.drag_mass, fleet.rotation)
+        for i, why in fleet.refused.items():
+            self._errors.setdefault(i, _said(why, leg.time))
+        for i in np.flatnonzero(~np.isfinite(number)).tolist():
+            self._errors.setdefault(i, _watched(number[i].item(), fleet.rotation[i].item(), self._settings, leg))
         self._stability = np.maximum(self._stability, number)
-        self._rotation = np.maximum(self._rotation, stretch.rotation)
-        for value, limit in zip(controls, saturate(controls, self._craft, np), strict=True):
+        self._rotation = np.maximum(self._rotation, fleet.rotation)
+        self._substeps += fleet.substeps
+        for value, limit in zip(controls[:3], self._saturated(controls), strict=True):
             self._held |= np.abs(value - limit) > HELD * np.maximum(1.0, np.abs(limit))
+
+    def _stability_number(self, drag_mass: Array, rotation: Array) -> Array:
+        """As model/subcycling.py has it."""
+        derived = self._crafts.derived
+        return drag_mass * derived["drag_rate"] + rotation * derived["spin_rate"]
+
+    def _saturated(self, controls: Controls) -> list[Array]:
+        thrust = np.clip(controls.thrust, self._parameters["thrust_min"], self._parameters["thrust_max"])
+        return [thrust, np.clip(controls.port, 0.0, 1.0), np.clip(controls.starboard, 0.0, 1.0)]
 
     def _keep(self, point: int, controls: Controls) -> None:
         read = self._plan.keep.read
-        seen: dict[str, Any] = dict(
-            zip((*STATES, *WATCHED), (*self._state, self._stability, self._rotation), strict=True)
-        )
-        seen |= zip(MOTION, observe_motion(self._state, np), strict=True)
-        if set(ACTION) & set(read):
-            seen |= zip(ACTION, observe_action(self._state, controls, self._craft, np), strict=True)
+        values = (*self._states, self._stability, self._rotation)
+        seen: dict[str, Any] = dict(zip((*STATES, *WATCHED), values, strict=True))
+        if {*MOTION, *ACTION} & set(read):
+            seen |= self._observed(controls)
         for i, name in enumerate(read):
             self._ran.record[self._group, point, i] = seen[name]
 
-    def _finish(self, legs: list[Leg]) -> None:
+    def _observed(self, controls: Controls) -> dict[str, Any]:
+        """As model/observation.py has it."""
+        surge, sway, force_x, force_y, moment = observe_fleet(self._states, controls, self._crafts)
+        vx, vy = self._states[3:5]
+        mass, inertia = self._parameters["mass"], self._parameters["inertia"]
+        thrust, port, starboard = self._saturated(controls)
+        action = (force_x, force_y, moment, force_x / mass, force_y / mass, moment / inertia, thrust,
+                  self._parameters["steering_force"] * (port - starboard))  # fmt: skip
+        return dict(zip((*MOTION, *ACTION), (surge, sway, np.sqrt(vx * vx + vy * vy), *action), strict=True))
+
+    def _finish(self) -> None:
         method = self._settings.integrator
-        warnings = (
+        self._ran.warnings[self._group] = (
             INPUT_HELD * self._held
+            + COUNTER_STOPPED * (self._substeps > SUBSTEPS_MAX)
             + STEP_UNSTABLE * (self._stability > method.stability_limit)
             + STEP_TURNS * (self._rotation > method.rotation_limit)
         )
-        failed = ~np.isfinite(sum(self._state) + self._stability)
-        self._ran.warnings[self._group] = np.where(failed, 0, warnings)
-        self._ran.record[self._group[failed]] = np.nan
-        for i in np.flatnonzero(failed):
-            self._ran.errors[self._group[i]] = self._why({k: c[i].item() for k, c in self._samples.items()}, legs)
+        failed = self._group[list(self._errors)]
+        self._ran.warnings[failed] = 0
+        self._ran.record[failed] = np.nan
+        for i, why in self._errors.items():
+            self._ran.errors[self._group[i]] = why
 
-    def _why(self, values: Mapping[str, float | int], legs: list[Leg]) -> str:
-        """What the model says of this craft alone."""
-        run = self._plan.run
-        state = State(*(float(values.get(name, run.value(name))) for name in STATES))
-        craft = _craft(run, values)
-        try:
-            for leg in legs:
-                controls = self._controls(leg.controls, values)
-                state = advance(state, controls, craft, leg.end - leg.time, self._settings).state
-        except (ValueError, ArithmeticError) as error:
-            return str(error)
-        return (
-            f"stability_number: must stay a finite number; set a smaller step_size than {self._settings.step_size!r} s"
-        )
+
+# ---- in the words of the FMU
+
+
+def _said(error: Exception, time: float) -> str:
+    if not isinstance(error, NonFiniteError):
+        return str(error)
+    return _runaway(STATES[State._fields.index(error.component)], error.value, time, error.substep)
+
+
+def _watched(stability: float, rotation: float, settings: Settings, leg: Leg) -> str:
+    """What is watched over a step may overflow where the motion just does not."""
+    name, value = ("stability_number", stability) if np.isfinite(rotation) else ("rotation_per_substep", rotation)
+    return _runaway(name, value, leg.time, settings.step_size)
+
+
+def _runaway(name: str, value: float, time: float, substep: float) -> str:
+    return (
+        f"{name} = {value!r} after {time!r} s: must stay a finite number; the step was refused and the state of "
+        f"{time!r} s stands; the motion is too fast for sub-steps of {substep!r} s: set a smaller step_size"
+    )

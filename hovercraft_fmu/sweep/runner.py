@@ -27,7 +27,6 @@ from .._version import __version__
 from ..building import default_fmu
 from ..fmu.interface import HOVERCRAFT
 from ..host import SimulationError, read_description
-from ..model.integrators import INTEGRATORS
 from .batch import run_batch
 from .engines import SETTINGS, Driver, Plan
 from .quantities import quantity_function, row_columns
@@ -40,7 +39,7 @@ Tell: TypeAlias = Callable[[int], None]
 
 FMU, BATCH = "fmu", "batch"
 ENGINES = (FMU, BATCH)
-MOST_RUNS = {FMU: 500, BATCH: 2000}
+MOST_RUNS = {FMU: 500, BATCH: 8000}
 """In a chunk: what a killed sweep makes anew, at most, for each worker."""
 LEAST_CHUNKS = {FMU: 32, BATCH: 2}
 """So that there is work for some workers."""
@@ -110,7 +109,7 @@ def sweep(
     Args:
         study: see `read_study`.
         fmu: the file; without it build/Hovercraft.fmu, which is built if it is not there.
-        engine: fmu, or batch: the bare model, all craft at once.
+        engine: fmu, or batch: the compiled kernel, all craft at once, with the bits of the native FMU.
         workers: processes on this machine; by default one a processor. 1: this process.
         scheduler: address of a dask.distributed scheduler, as tcp://10.0.0.1:8786, whose workers have this package.
         output: folder of the results; by default build/sweep/ and the name of the study.
@@ -163,8 +162,9 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
     content = None
     if engine == BATCH:
         if fmu is not None:
-            raise ValueError(f"fmu = {str(fmu)!r}: must not be given with the engine batch, which is the bare model")
-        _check_batch(study)
+            raise ValueError(
+                f"fmu = {str(fmu)!r}: must not be given with the engine batch, which is the compiled kernel"
+            )
     else:
         content = _content(study, Path(fmu or default_fmu()))
     swept = tuple(factor.name for factor in study.factors)
@@ -196,18 +196,6 @@ def _chunk(plan: Plan, runs: int, engine: str) -> int:
         substeps = (plan.run.stop_time - plan.run.start_time) / float(plan.run.value("step_size"))
         most = min(most, int(MOST_SUBSTEPS / substeps))
     return max(1, most)
-
-
-def _check_batch(study: Study) -> None:
-    """The adaptive method chooses its steps for each craft."""
-    swept = {factor.name: factor.values for factor in study.factors}
-    for number in swept.get("integrator", (study.run.value("integrator"),)):
-        method = INTEGRATORS[int(number) - 1]
-        if method.integrate is None:
-            raise ValueError(
-                f"integrator = {method.name!r}: must be another one with the engine batch, in which all craft share "
-                "the step; use the engine fmu"
-            )
 
 
 def _content(study: Study, path: Path) -> bytes:

@@ -391,19 +391,17 @@ int64_t fleet_advance(const struct fleet *fleet, const struct way *way, const st
     return block.filled ? refused + advance_block(&block, fleet, way, reached, wide) : refused;
 }
 
-int32_t fleet_check(const struct fleet *fleet, int32_t *found)
+int32_t fleet_derived(const struct fleet *fleet, double *derived)
 {
-    if (!fleet || !found || fleet->count < 0 || !is_there(fleet->constants, FLEET_CONSTANTS))
+    if (!fleet || !derived || fleet->count < 0 || !is_there(fleet->constants, FLEET_CONSTANTS))
         return -1;
     for (int64_t i = 0; i < fleet->count; i++) {
         const struct craft craft = craft_at(fleet, i);
-        const struct derived derived = kernel_derived(&craft);
-        double values[sizeof derived / sizeof(double)];
-        memcpy(values, &derived, sizeof values);
-        found[i] = -1;
-        for (int k = (int)(sizeof derived / sizeof(double)) - 1; k >= 0; k--)
-            if (!isfinite(values[k]))
-                found[i] = k;
+        const struct derived of_craft = kernel_derived(&craft);
+        double values[sizeof of_craft / sizeof(double)];
+        memcpy(values, &of_craft, sizeof values);
+        for (size_t k = 0; k < sizeof values / sizeof *values; k++)
+            derived[(int64_t)k * fleet->count + i] = values[k];
     }
     return 0;
 }

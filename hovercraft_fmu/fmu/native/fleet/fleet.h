@@ -18,7 +18,7 @@ struct fleet {
     struct column states[FLEET_STATES];       /* in the order of struct state */
     struct column controls[FLEET_CONTROLS];   /* in the order of struct controls */
     struct column slopes[FLEET_CONTROLS];     /* per s, of the controls */
-    struct column constants[FLEET_CONSTANTS]; /* in the order of struct craft; checked (fleet_check, and each alone) */
+    struct column constants[FLEET_CONSTANTS]; /* in the order of struct craft; checked, and what is derived of them, too */
 };
 
 struct way {
@@ -53,8 +53,8 @@ enum refusal { MOVED, TOO_MANY, RUNAWAY, TOO_SMALL, NOT_A_STEP, NOT_A_NUMBER };
 
 /* How many craft were refused; -1 where a pointer is missing, or the method is none. A step of 0 changes no bit. */
 FLEET_EXPORT int64_t fleet_advance(const struct fleet *fleet, const struct way *way, const struct reached *reached);
-/* Of each craft, which number in struct derived is the first that is not finite; -1: none. */
-FLEET_EXPORT int32_t fleet_check(const struct fleet *fleet, int32_t *found);
+/* Number k in struct derived of craft i goes to derived[k * count + i]. */
+FLEET_EXPORT int32_t fleet_derived(const struct fleet *fleet, double *derived);
 /* Surge, sway [m/s]; force x, y [N], moment [N.m]; no slopes. */
 FLEET_EXPORT int32_t fleet_observe(const struct fleet *fleet, double *const motion[2], double *const loads[3]);
 
