@@ -679,9 +679,9 @@ def test_without_its_libraries_the_command_says_how_to_get_them(tmp_path: Path) 
 
 
 @pytest.mark.once
-def test_the_quick_costs_of_a_run(tmp_path: Path, native_fmu: Path) -> None:
+def test_the_quick_costs_of_a_run(tmp_path: Path, complete_native_fmu: Path) -> None:
     """Every way is measured; no clock is asserted."""
-    assert native_fmu.exists()
+    assert complete_native_fmu.exists()
     report = carry_out("sweeps", quick=True, folder=tmp_path)
     rows = list(csv.DictReader((tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()))
     assert [row["way"] for row in rows] == list(dict.fromkeys(way.way for way in sweep_costs.WAYS))

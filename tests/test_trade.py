@@ -146,9 +146,9 @@ def quick(name: str, folder: Path) -> str:
 
 
 @pytest.mark.once
-def test_the_quick_trade(tmp_path: Path, native_fmu: Path) -> None:
+def test_the_quick_trade(tmp_path: Path, complete_native_fmu: Path) -> None:
     """What is committed was written by the same command, and tells the same of the errors."""
-    assert native_fmu.exists()  # so there is machine code
+    assert complete_native_fmu.exists()  # so there is machine code
     printed = quick("trade", tmp_path)
     rows, advice = records(tmp_path / "work_precision.csv"), records(tmp_path / "advice.csv")
     assert {row["integrator"] for row in rows} == {method.name for method in INTEGRATORS}
@@ -178,8 +178,8 @@ def numbers(row: dict[str, str]) -> dict[str, Any]:
 
 
 @pytest.mark.once
-def test_the_quick_costs_of_a_step(tmp_path: Path, native_fmu: Path) -> None:
-    assert native_fmu.exists()
+def test_the_quick_costs_of_a_step(tmp_path: Path, complete_native_fmu: Path) -> None:
+    assert complete_native_fmu.exists()
     quick("step-costs", tmp_path)
     costs = records(tmp_path / "native.csv")
     assert {f"{method.name}: a sub-step" for method in INTEGRATORS} <= {row["what"] for row in costs}
