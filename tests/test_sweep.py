@@ -359,6 +359,7 @@ RANGE = {"from": 50.0, "to": 200.0}
         ({"set": {"mass": -3}}, "set.mass = -3.0: must be greater than 0"),
         ({"set": {"mass": True}}, "set.mass = True: must be a"),
         ({"set": {"integrator": 1.5}}, "set.integrator = 1.5: must be a whole number or a name"),
+        ({"stop_time": 1e300}, "must not make more than 10^8 steps"),
         ({"set": {"integrator": "magic"}}, "set.integrator = 'magic': must be one of semi_implicit_euler"),
         ({"set": {"step_size": 0.0}}, "set.step_size = 0.0 s: must be a finite number greater than 0"),
         ({"set": {"mass": 90}}, "set.mass = 90: must not be swept, too"),

@@ -25,6 +25,9 @@ Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
 Progress: TypeAlias = Callable[[float], None]
 """Called with the time [s] reached, after every communication step."""
 
+MAX_STEPS = 10**8
+"""Communication steps of a run: a year at 0.3 s, or a slip of the decimal point."""
+
 
 def method_in_words(integrator: str, step_size: float, tolerance: float) -> str:
     """'rk4, 0.1 s'; of the adaptive method it is the tolerance that drives the accuracy."""
@@ -167,22 +170,25 @@ def start_value(name: str, value: Value) -> float | int:
     """The value as a number of the variable's type; an item of an enumeration may be given by name.
 
     Raises:
-        ValueError: no such variable, one that cannot be set, or not a number.
+        ValueError: no such variable, one that cannot be set, not a number, or no whole one where it must be.
     """
     variable = BY_NAME.get(name)
     if variable is None or variable.start is None:
         settable = ", ".join(each.name for each in BY_NAME.values() if each.start is not None)
         raise ValueError(f"{name} = {value}: must be a variable that can be set: {settable}")
+    if variable.enumeration and isinstance(value, str) and not value.isdigit():
+        return _item(name, value, variable.enumeration)
     try:
-        if variable.kind == "Real":
-            return float(value)
-        if variable.enumeration and isinstance(value, str) and not value.isdigit():
-            return _item(name, value, variable.enumeration)
-        return int(value)
+        number = float(value)
     except (TypeError, ValueError) as error:
-        if variable.enumeration and isinstance(value, str):
-            raise
         raise ValueError(f"{name} = {value!r}: must be a number") from error
+    if isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} = {value!r}: must be a number")
+    if variable.kind == "Real":
+        return number
+    if not number.is_integer():
+        raise ValueError(f"{name} = {value!r}: must be a whole number" + (" or a name" if variable.enumeration else ""))
+    return int(number)
 
 
 def _item(name: str, value: str, enumeration: Enumeration) -> int:
@@ -201,3 +207,9 @@ def _check_times(run: Run) -> None:
         raise ValueError(f"communication_step = {run.communication_step!r} s: must be greater than 0")
     if not run.stop_time > run.start_time:
         raise ValueError(f"stop_time = {run.stop_time!r} s: must be after start_time = {run.start_time!r} s")
+    steps = (run.stop_time - run.start_time) / run.communication_step
+    if steps > MAX_STEPS:
+        raise ValueError(
+            f"communication_step = {run.communication_step!r} s: must not make more than 10^8 steps from "
+            f"{run.start_time!r} s to {run.stop_time!r} s; it makes {steps:.3g}"
+        )

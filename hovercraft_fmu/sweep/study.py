@@ -240,8 +240,6 @@ def _checked(name: str, value: Any, where: str) -> float | int:
         number = start_value(name, value)
         if not np.isfinite(number):
             raise ValueError(f"{name} = {number!r}: must be a finite number")
-        if isinstance(value, bool) or (isinstance(value, float) and value != number):
-            raise ValueError(f"{name} = {value!r}: must be a whole number or a name")
         if name in Craft.__dataclass_fields__:
             check_parameter(name, number)
         elif name == "step_size":
