@@ -422,7 +422,8 @@ def _named(fmu: Path | None, kind: Kind | None) -> Path:
     if fmu and kind:
         raise click.UsageError(f"--fmu {kind}: must not be given together with the file {fmu}")
     path = fmu or default_fmu(kind)
-    OUTPUT.print(f"running {path}")
+    if path.is_file():  # what runs it says what is wrong with another
+        OUTPUT.print(f"running {path}")
     return path
 
 
