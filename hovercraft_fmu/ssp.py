@@ -68,6 +68,10 @@ def system_structure(voyage: Voyage, craft: str, autopilot: str) -> Element:
             ends = {"startElement": start, "startConnector": name, "endElement": end, "endConnector": name}
             SubElement(connections, f"{{{SSD}}}Connection", ends)
     _annotate_for_openmodelica(system, voyage.communication_step)
+    units = SubElement(root, f"{{{SSD}}}Units")
+    for name, unit in {**HOVERCRAFT.units, **AUTOPILOT_MODEL.units}.items():
+        node = SubElement(units, f"{{{SSC}}}Unit", {"name": name})
+        SubElement(node, f"{{{SSC}}}BaseUnit", {base: str(exponent) for base, exponent in unit.base.items()})
     experiment = SubElement(
         root, f"{{{SSD}}}DefaultExperiment", {"startTime": "0.0", "stopTime": repr(voyage.stop_time)}
     )
@@ -103,7 +107,8 @@ def _component(
     for kind, names in (("input", inputs), ("output", outputs)):
         for each in names:
             connector = SubElement(connectors, f"{{{SSD}}}Connector", {"name": each, "kind": kind})
-            SubElement(connector, f"{{{SSC}}}{variables[each].kind}")
+            unit = variables[each].unit
+            SubElement(connector, f"{{{SSC}}}{variables[each].kind}", {"unit": unit} if unit else {})
     if parameters:
         bindings = SubElement(node, f"{{{SSD}}}ParameterBindings")
         SubElement(bindings, f"{{{SSD}}}ParameterBinding", {"source": parameters})

@@ -76,14 +76,14 @@ def test_it_is_small(archive: dict[str, bytes]) -> None:
         ("terminalsAndIcons/terminalsAndIcons.xml", "fmi3TerminalsAndIcons.xsd"),
     ],
 )
-def test_what_fmi_3_lends(file: str, schema: str, archive: dict[str, bytes]) -> None:
+def test_what_fmi_3_brings(file: str, schema: str, archive: dict[str, bytes], flavour: Flavour) -> None:
+    if flavour.fmi == 2 and file not in archive:
+        assert file.startswith("terminalsAndIcons")  # tests/test_letter.py says why
+        return
     tree = etree.fromstring(archive[file])
     etree.XMLSchema(file=str(SCHEMAS / schema)).assertValid(tree)
-    for member in tree.iter("TerminalMemberVariable"):
-        assert member.get("variableName") in BY_NAME
     for source in tree.iter("SourceFile"):
         assert f"sources/{source.get('name')}" in archive
-    assert archive["terminalsAndIcons/icon.png"].startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(("platform", "machine"), [("x86_64-linux", 62), ("aarch64-linux", 183)])

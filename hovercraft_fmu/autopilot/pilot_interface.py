@@ -69,7 +69,7 @@ VARIABLES: tuple[Variable, ...] = (
     ),
     *(
         Variable(14 + 2 * WAYPOINTS_MAX + i, name, "parameter", "tunable", UNITS_OF_GAINS[name],
-                 getattr(Gains(), name), f"{_MEANING[name]}, greater than 0", minimum=0.0)
+                 getattr(Gains(), name), f"{_MEANING[name]}, greater than 0")
         for i, name in enumerate(GAINS)
     ),
 )  # fmt: skip

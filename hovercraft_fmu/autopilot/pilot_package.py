@@ -13,7 +13,7 @@ AUTOPILOT = PYTHON.of(AUTOPILOT_MODEL)
 HERE = Path(__file__).parent
 PICTURE = "loop.png"
 """A voyage, as `hovercraft-fmu demo --loop` draws it."""
-ALWAYS = ("style.css", "externalDependencies.txt", "licenses/license.txt")
+ALWAYS = ("style.css", "externalDependencies.txt")
 """Of the hovercraft's documentation, what holds for this FMU, too."""
 
 

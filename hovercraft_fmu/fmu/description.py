@@ -30,7 +30,7 @@ CAPABILITIES = {
     "maxOutputDerivativeOrder": "0",
     "canRunAsynchronuously": "false",  # sic: the schema spells it so
 }
-NATIVE_CAPABILITIES = {"canNotUseMemoryManagementFunctions": "false", "providesDirectionalDerivative": "true"}
+NATIVE_CAPABILITIES = {"providesDirectionalDerivative": "true"}
 CAPABILITIES_3 = {
     "needsExecutionTool": "false",
     "canBeInstantiatedOnlyOncePerProcess": "false",
@@ -109,6 +109,7 @@ PYTHON = Flavour(
         {
             "logStatusFatal": "A call that was refused, as pythonfmu's wrapper reports it: the instance must be freed",
             **LOG_CATEGORIES,
+            "cppfmu": "A function of FMI that pythonfmu's wrapper does not have",
         }
     ),
 )
@@ -268,7 +269,7 @@ def _variable(parent: Element, variable: Variable, flavour: Flavour) -> None:
     for name, value in numbers.items():
         if value is not None:
             node.set(name, repr(value))  # repr: the shortest text that gives the same bits
-    if variable.derivative_of:
+    if variable.derivative_of and flavour.exchange:  # it points into the list of derivatives, which no other FMU has
         node.set("derivative", _place(variable.derivative_of, flavour))
 
 
@@ -310,6 +311,7 @@ def _structure(parent: Element, flavour: Flavour) -> None:
         outputs, derivatives = dict.fromkeys(outputs, ()), {}
     calculated = {v.name for v in table if v.initial == "calculated"}
     initial |= {name: _followed_initially(name) for name in derivatives if name in calculated}
+    initial = dict(sorted(initial.items(), key=lambda unknown: flavour.model.index[unknown[0]]))
     _unknowns(parent, "Output", outputs, flavour)
     _unknowns(parent, "Derivative" if flavour.fmi == 2 else "ContinuousStateDerivative", derivatives, flavour)
     _unknowns(parent, "InitialUnknown", initial, flavour)

@@ -17,6 +17,7 @@ from .interface import VARIABLES, WARNINGS
 from .variable import Variable
 
 FOLDER = Path(__file__).parent / "documentation"
+LICENSE_FILE = "licenses/license.txt"
 CHECKED: Mapping[str, str] = {
     PYTHON.identifier: "checked.md",
     NATIVE.identifier: "checked_native.md",
@@ -43,11 +44,18 @@ def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
     return rendered(FOLDER, values)
 
 
+def licenses(parts: str, file: str, notice: bytes) -> dict[str, bytes]:
+    """The package's licence, which names the parts under another one, and that one: path -> content."""
+    ours = (FOLDER / LICENSE_FILE).read_bytes()
+    return {LICENSE_FILE: ours + f"\n{parts}: see {file}.\n".encode(), f"licenses/{file}": notice}
+
+
 def documents(flavour: Flavour) -> dict[str, bytes]:
-    """All of documentation/ but licences of others, for one of the hovercraft's FMUs: path -> content."""
+    """All of documentation/ but licences, for one of the hovercraft's FMUs: path -> content."""
     static = {
         path.relative_to(FOLDER).as_posix(): path.read_bytes() for path in sorted(FOLDER.rglob("*")) if _goes(path)
     }
+    del static[LICENSE_FILE]
     if flavour.parts:
         del static["externalDependencies.txt"]
     return {**static, **{name: page.encode() for name, page in pages(flavour).items()}}

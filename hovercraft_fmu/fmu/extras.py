@@ -1,22 +1,21 @@
-"""FMI 3.0's build description for the sources, terminals and icon; FMI 2.0.4 lets an FMU carry them, too."""
+"""FMI 3.0's build description for the sources, which FMI 2.0.4 lets an FMU carry, too; its terminals and icon."""
 
-from collections.abc import Iterable, Mapping
-from types import MappingProxyType
-from xml.etree.ElementTree import Element, SubElement
+from collections.abc import Iterable
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, register_namespace
 
-from .description import Flavour
-from .interface import INPUTS, STATES
+from .description import Flavour, xml
+from .interface import INPUTS
+from .variable import Model
 
-TERMINALS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "actuators": tuple(name for name in INPUTS if not name.startswith("wind.")),
-        "wind": tuple(name for name in INPUTS if name.startswith("wind.")),
-        "motion": STATES,
-    }
-)
-"""Variables that belong together: what a host may connect at once."""
-ICON_SIZE = 100.0
-"""Units of the diagram."""
+ACTUATORS = tuple(name for name in INPUTS if "." not in name)
+"""The craft's commands: the terminal of that name."""
+LS_REF, LS_MANIFEST = "org.fmi-standard.fmi-ls-ref", "http://fmi-standard.org/fmi-ls-manifest"
+register_namespace("fmi-ls", LS_MANIFEST)
+RESULT = Path(__file__).parent / "extra" / "out.csv"
+"""As `studies/pages.py` wrote it, from a run of the native FMU: its bits depend on no machine."""
+ICON_SIZE, ICON_MM = 100.0, 20.0
+"""Width and height of the icon, in units of the diagram and in mm."""
 
 
 def build_description(flavour: Flavour, options: Iterable[str]) -> Element:
@@ -39,16 +38,53 @@ def build_description(flavour: Flavour, options: Iterable[str]) -> Element:
     return root
 
 
-def terminals_and_icons() -> Element:
-    """terminalsAndIcons/terminalsAndIcons.xml; the icon stands beside it."""
+def terminals(model: Model) -> dict[str, dict[str, str]]:
+    """Terminal -> member -> variable: inputs and outputs that belong together, what a host may connect at once.
+
+    By the scheme that FMI 3.0.2 suggests (2.4.9.2.2) a variable is named TERMINAL.MEMBER; and there are the commands.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for variable in model.variables:
+        terminal, _, member = variable.name.rpartition(".")
+        if variable.name in ACTUATORS:
+            terminal, member = "actuators", variable.name
+        if terminal and variable.causality in ("input", "output"):
+            found.setdefault(terminal, {})[member] = variable.name
+    return found
+
+
+def terminals_and_icons(model: Model) -> Element:
+    """terminalsAndIcons/terminalsAndIcons.xml; the icon stands beside it.
+
+    In FMUs of FMI 3.0 alone: FMI 2.0.4 allows one of version 3.0, but FMI Library takes it there for a fatal error.
+    """
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     graphics = SubElement(root, "GraphicalRepresentation")
-    corners = {"x1": -ICON_SIZE / 2, "y1": -ICON_SIZE / 2, "x2": ICON_SIZE / 2, "y2": ICON_SIZE / 2}
-    SubElement(graphics, "Icon", {name: repr(value) for name, value in corners.items()})
+    half = ICON_SIZE / 2
+    corners = {"x1": repr(-half), "y1": repr(-half), "x2": repr(half), "y2": repr(half)}
+    SubElement(graphics, "CoordinateSystem", {**corners, "suggestedScalingFactorTo_mm": repr(ICON_MM / ICON_SIZE)})
+    SubElement(graphics, "Icon", corners)
     parent = SubElement(root, "Terminals")
-    for terminal, names in TERMINALS.items():
-        node = SubElement(parent, "Terminal", {"name": terminal, "matchingRule": "plug"})
-        for name in names:
-            member = {"variableName": name, "memberName": name, "variableKind": "signal"}
-            SubElement(node, "TerminalMemberVariable", member)
+    for terminal, members in terminals(model).items():
+        # bus: the other side may have some of them alone
+        node = SubElement(parent, "Terminal", {"name": terminal, "matchingRule": "bus"})
+        for member, name in members.items():
+            attributes = {"variableName": name, "memberName": member, "variableKind": "signal"}
+            SubElement(node, "TerminalMemberVariable", attributes)
     return root
+
+
+def reference_result(identifier: str) -> dict[str, bytes]:
+    """What the default experiment gives, with the manifest of FMI-LS-REF 1.0.0-alpha.1: path -> content."""
+    file = f"{identifier}_out.csv"
+    root = Element(
+        "fmiReferences",
+        {
+            f"{{{LS_MANIFEST}}}fmi-ls-name": LS_REF,
+            f"{{{LS_MANIFEST}}}fmi-ls-version": "1.0.0-alpha.1",
+            f"{{{LS_MANIFEST}}}fmi-ls-description": "Files that are related to this FMU",
+        },
+    )
+    about = "Outputs of the default experiment, every second"
+    SubElement(root, "Related", {"type": "text/csv", "source": file, "role": "result", "description": about})
+    return {f"extra/{LS_REF}/fmi-ls-manifest.xml": xml(root), f"extra/{LS_REF}/{file}": RESULT.read_bytes()}

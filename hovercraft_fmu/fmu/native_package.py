@@ -6,8 +6,8 @@ from pathlib import Path
 
 from .archive import write_archive, zipped
 from .description import NATIVE, Flavour, model_description, xml
-from .document import documents
-from .extras import build_description, terminals_and_icons
+from .document import documents, licenses
+from .extras import build_description, reference_result, terminals_and_icons
 from .icon import icon_png
 from .mach_o import universal
 from .machine_code import C_FOLDER, OPTIONS, PLATFORMS, identity, library, sources
@@ -34,15 +34,17 @@ def build_native_fmu(
 
 
 def _archive(flavour: Flavour, platforms: Iterable[str]) -> bytes:
+    pages = {**documents(flavour), **licenses("Sine, cosine and logarithm are fdlibm's", "fdlibm.txt", _sun_notice())}
     files = {
-        **{f"documentation/{name}": content for name, content in documents(flavour).items()},
-        "documentation/licenses/fdlibm.txt": _sun_notice(),
+        **{f"documentation/{name}": content for name, content in pages.items()},
+        **reference_result(flavour.identifier),
         "sources/buildDescription.xml": xml(build_description(flavour, OPTIONS)),
-        "terminalsAndIcons/icon.png": icon_png(),
-        "terminalsAndIcons/terminalsAndIcons.xml": xml(terminals_and_icons()),
     }
     if flavour.fmi == 2:
         files["model.png"] = icon_png()
+    else:
+        files["terminalsAndIcons/icon.png"] = icon_png()
+        files["terminalsAndIcons/terminalsAndIcons.xml"] = xml(terminals_and_icons(flavour.model))
     build = identity(flavour)
     return zipped(
         {

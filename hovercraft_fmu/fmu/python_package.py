@@ -10,7 +10,8 @@ import pythonfmu
 
 from .archive import digest, write_archive, zipped
 from .description import PYTHON, Flavour, model_description, xml
-from .document import documents
+from .document import documents, licenses
+from .extras import reference_result
 from .icon import icon_png
 
 PACKAGE = Path(__file__).parent.parent
@@ -58,10 +59,17 @@ class Content:
     """What of this package goes into it, beside SHARED."""
     documents: Callable[[], dict[str, bytes]]
     """Files of documentation/, by path."""
+    extra: Callable[[], dict[str, bytes]] = dict
+    """Files of extra/, by path in the FMU."""
 
 
 HOVERCRAFT_CONTENT = Content(
-    PYTHON, "fmu.python.slave", "HovercraftSlave", ("fmu/python/slave.py",), lambda: documents(PYTHON)
+    PYTHON,
+    "fmu.python.slave",
+    "HovercraftSlave",
+    ("fmu/python/slave.py",),
+    lambda: documents(PYTHON),
+    lambda: reference_result(PYTHON.identifier),
 )
 
 
@@ -88,7 +96,8 @@ def _archive(content: Content) -> bytes:
     entry = ENTRY_SCRIPT.format(
         package=package, module=content.module, slave=content.slave, model=flavour.identifier, build=build
     )
-    documentation = {**content.documents(), "licenses/pythonfmu.txt": _pythonfmu_license()}
+    parts = f"The binaries and the modules in resources/{package}/pythonfmu are PythonFMU's"
+    documentation = {**content.documents(), **licenses(parts, "pythonfmu.txt", _pythonfmu_license())}
     return zipped(
         {
             "modelDescription.xml": xml(model_description(build, flavour)),
@@ -98,6 +107,7 @@ def _archive(content: Content) -> bytes:
             f"resources/{package}/__init__.py": b'"""The model of one FMU."""\n',
             **{f"resources/{package}/{name}": text for name, text in code.items()},
             **wrappers,
+            **content.extra(),
             **{f"documentation/{name}": text for name, text in documentation.items()},
         }
     )

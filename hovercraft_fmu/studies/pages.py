@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import polars as pl
+from fmpy import simulate_fmu
 from matplotlib import rc_context
 from PIL import Image, PngImagePlugin
 
@@ -21,7 +22,9 @@ from ..coupling import sail
 from ..fmu.archive import digest
 from ..fmu.document import FOLDER as PACKED
 from ..fmu.document import rendered
-from ..fmu.interface import ACTION, MOTION, STATES, WATCHED
+from ..fmu.extras import RESULT
+from ..fmu.interface import ACTION, HOVERCRAFT, MOTION, STATES, WATCHED
+from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..model.integrators import INTEGRATORS
 from ..scenes import CONTROL_LOGS, SCENES, VOYAGES
@@ -29,6 +32,7 @@ from ..simulation import plan, run_model
 from ..sweep import sweep
 from ..sweep.plots import plot_sweep
 from ..sweep.study import SHIPPED
+from ..view.diagram import draw_diagram
 from ..view.plots import plot_passage, plot_run
 from . import closed_loop, scene_terms, work_precision
 
@@ -39,6 +43,7 @@ HERE = Path(__file__).parent
 RESULTS = HERE / "results"
 """What `hovercraft-fmu measure` wrote, with `--output` there; the pictures it leaves there are not committed."""
 PICTURES: Mapping[str, tuple[Path, ...]] = {
+    "diagram.png": (),
     "ice.png": (CONTROL_LOGS / "ice.csv",),
     "turning_circle.png": (SHIPPED / "turning_circle.toml", SHIPPED / "turning_circle.csv"),
     "stability.png": (RESULTS / "stability.csv", RESULTS / "extremes.csv"),
@@ -86,7 +91,7 @@ def in_palette(picture: Path, shows: str) -> bytes:
     return content.getvalue()
 
 
-def lines(figure: "Figure", shows: str) -> bytes:
+def line_art(figure: "Figure", shows: str) -> bytes:
     """An SVG, which says what it shows; the same bytes each time."""
     content = io.BytesIO()
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hovercraft"}):
@@ -102,7 +107,7 @@ def assemble(results: Path = RESULTS) -> list[Path]:
     files = {PACKED / name: content for name, content in pages().items()}
     for name, draw in DRAWN.items():
         (table,) = PICTURES[name]
-        files[PACKED / name] = lines(draw(pl.read_csv(table)), shown(name))
+        files[PACKED / name] = line_art(draw(pl.read_csv(table)), shown(name))
     with tempfile.TemporaryDirectory() as folder:
         _draw(Path(folder))
         for name in PICTURES.keys() - DRAWN.keys():
@@ -110,13 +115,26 @@ def assemble(results: Path = RESULTS) -> list[Path]:
             if picture:
                 files[PACKED / name] = in_palette(picture, shown(name))
         files[pilot_package.HERE / pilot_package.PICTURE] = in_palette(Path(folder) / pilot_package.PICTURE, "")
+        files[RESULT] = reference_result(build_native_fmu(Path(folder) / "HovercraftNative.fmu"))
     for path, content in files.items():
         path.write_bytes(content)
     return sorted(files)
 
 
+def reference_result(fmu: Path) -> bytes:
+    """The outputs of the default experiment, every second, as CSV; the shortest text that gives the same bits."""
+    outputs = [variable.name for variable in HOVERCRAFT.variables if variable.causality == "output"]
+    found = simulate_fmu(
+        str(fmu), output_interval=HOVERCRAFT.communication_step, output=outputs, fmi_type="CoSimulation"
+    )
+    rows = found[:: round(1.0 / HOVERCRAFT.communication_step)]
+    lines = [",".join(found.dtype.names), *(",".join(map(repr, row.tolist())) for row in rows)]
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
 def _draw(folder: Path) -> None:
     """What is drawn anew each time: it takes seconds."""
+    draw_diagram().savefig(folder / "diagram.png", format="png")
     ice = plan(CONTROL_LOGS / "ice.csv", preset="ice", communication_step=SCENES["ice"].communication_step)
     plot_run(run_model(ice), folder / "ice.png")
     fmu, autopilot = build_fmu(folder / "Hovercraft.fmu"), pilot_package.build_autopilot(folder / "Autopilot.fmu")

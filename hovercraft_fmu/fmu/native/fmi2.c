@@ -35,20 +35,17 @@ static void tell(void *sink, enum verdict verdict, const char *category, const c
         c->callbacks.logger(c->callbacks.componentEnvironment, c->name, status_of(verdict), category, message);
 }
 
+/* The host's own memory management is not asked: canNotUseMemoryManagementFunctions. */
 static void *allocate(void *sink, size_t size)
 {
-    const struct component *c = sink;
-    return c->callbacks.allocateMemory && c->callbacks.freeMemory ? c->callbacks.allocateMemory(1, size)
-                                                                  : memory_allocate(1, size);
+    (void)sink;
+    return memory_allocate(1, size);
 }
 
 static void release(void *sink, void *memory)
 {
-    const struct component *c = sink;
-    if (c->callbacks.allocateMemory && c->callbacks.freeMemory)
-        c->callbacks.freeMemory(memory);
-    else
-        memory_release(memory);
+    (void)sink;
+    memory_release(memory);
 }
 
 /* ---- general */
@@ -85,29 +82,24 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
 {
     static const fmi2CallbackFunctions none = {NULL, NULL, NULL, NULL, NULL};
-    struct component given = {.callbacks = functions ? *functions : none};
     const size_t length = name ? strlen(name) : 0;
-    struct component *c = allocate(&given, sizeof *c + length + 1);
+    struct component *c = memory_allocate(1, sizeof *c + length + 1);
     if (!c)
         return NULL;
-    c->callbacks = given.callbacks;
+    c->callbacks = functions ? *functions : none;
     memcpy(c->name, name ? name : "", length);
     c->name[length] = '\0';
     const struct services services = {2, tell, allocate, release, c};
     instance_start(&c->instance, type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION, &services, logging != 0);
     if (is_acceptable(&c->instance, type, guid))
         return c;
-    release(&given, c);
+    memory_release(c);
     return NULL;
 }
 
 void fmi2FreeInstance(fmi2Component component)
 {
-    struct component *c = component;
-    if (c) {
-        struct component given = {.callbacks = c->callbacks};
-        release(&given, c);
-    }
+    memory_release(component);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start_time,

@@ -1,0 +1,228 @@
+"""What the standards ask of the files of an FMU, rule by rule; in brackets the sections of FMI 2.0.5 and FMI 3.0.2."""
+
+import re
+import zipfile
+from ctypes import byref, c_int
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+from lxml import etree
+
+from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL
+from hovercraft_fmu.autopilot.pilot_package import AUTOPILOT
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour, model_description, xml
+from hovercraft_fmu.fmu.extras import RESULT, terminals
+from hovercraft_fmu.fmu.interface import BY_NAME, HOVERCRAFT, STATES
+from hovercraft_fmu.studies.pages import reference_result
+from tests.lowlevel import one
+
+FLAVOURS = [PYTHON, NATIVE, NATIVE3, AUTOPILOT]
+
+
+@pytest.fixture(params=FLAVOURS, ids=lambda flavour: flavour.identifier)
+def kind(request: pytest.FixtureRequest) -> Flavour:
+    made: Flavour = request.param
+    return made
+
+
+@pytest.fixture
+def description(kind: Flavour) -> Any:
+    return etree.fromstring(xml(model_description("0" * 32, kind)))
+
+
+def variables(description: Any) -> list[Any]:
+    """Of FMI 2.0 the inner elements, which have the bounds."""
+    return [node[0] if node.tag == "ScalarVariable" else node for node in description.find("ModelVariables")]
+
+
+def unknowns(description: Any, kind: Flavour, role: str) -> list[Any]:
+    structure = description.find("ModelStructure")
+    return list(structure.iterfind(f"{role}s/Unknown" if kind.fmi == 2 else role))
+
+
+def places(nodes: list[Any], kind: Flavour) -> list[int]:
+    """Where the variables of some unknowns are in ModelVariables."""
+    key = "index" if kind.fmi == 2 else "valueReference"
+    return [_place(node.get(key), kind) for node in nodes]
+
+
+def _place(text: str, kind: Flavour) -> int:
+    if kind.fmi == 2:
+        return int(text)
+    model = kind.model
+    return model.index[model.by_reference[int(text)].name]
+
+
+@pytest.mark.parametrize("role", ["Output", "InitialUnknown"])
+def test_unknowns_are_in_the_order_of_their_variables(role: str, description: Any, kind: Flavour) -> None:
+    """[2.0: 2.2.8] InitialUnknowns by index; outputs as declared, which both standards call best."""
+    found = places(unknowns(description, kind, role), kind)
+    assert found
+    assert found == sorted(set(found))
+
+
+def test_dependencies_are_in_ascending_order(description: Any, kind: Flavour) -> None:
+    """[2.0: 2.2.8] by magnitude, the smallest index first."""
+    for node in description.find("ModelStructure").iter("*"):
+        found = [_place(each, kind) for each in (node.get("dependencies") or "").split()]
+        assert found == sorted(set(found))
+
+
+def test_derivatives_are_in_the_order_of_the_states(description: Any, kind: Flavour) -> None:
+    """[2.0: 2.2.8; 3.0: 2.4.8] the order of the derivatives is that of the vector of states."""
+    role = "Derivative" if kind.fmi == 2 else "ContinuousStateDerivative"
+    found = places(unknowns(description, kind, role), kind)
+    states = [kind.model.variables[place - 1].derivative_of for place in found]
+    assert states == (list(STATES) if kind.exchange else [])
+
+
+def test_derivative_is_told_where_there_are_derivatives(description: Any, kind: Flavour) -> None:
+    """[2.0: 2.2.7] `derivative` is of a continuous-time state: no list of derivatives, no such thing."""
+    told = [node for node in variables(description) if node.get("derivative")]
+    assert len(told) == (len(STATES) if kind.exchange else 0)
+
+
+def test_bounds_are_taken(each_fmu: Path) -> None:
+    """[2.0: 2.2.7; 3.0: 2.4.7.4] `min` and `max` are the smallest and largest value, not the first that is refused."""
+    with one(each_fmu) as (instance, _):
+        for variable in HOVERCRAFT.variables:
+            if variable.start is None or variable.kind != "Real":
+                continue
+            for bound in (variable.minimum, variable.maximum):
+                if bound is not None:
+                    instance.setReal([variable.reference], [bound])
+
+
+def test_what_must_be_greater_than_0_has_no_bound_of_0(description: Any) -> None:
+    for node in variables(description):
+        text = node.get("description") or node.getparent().get("description")
+        if "greater than 0" in text:
+            assert node.get("min") is None
+
+
+def test_the_hosts_memory_management_is_not_asked(description: Any, kind: Flavour) -> None:
+    """[2.0: 2.1.5, 3.3.1, 4.3.1] the flag says that the FMU brings its own."""
+    if kind.fmi == 2:
+        for node in (*description.iterfind("CoSimulation"), *description.iterfind("ModelExchange")):
+            assert node.get("canNotUseMemoryManagementFunctions") == "true"
+
+
+def test_the_categories_that_are_logged_are_declared(fmu: Path, tmp_path: Path) -> None:
+    """[2.0: 2.2.4] those of the model's messages, and those that pythonfmu's wrapper makes of its own.
+
+    And what the page says of that wrapper: to fmi2GetStatus it answers fmi2Error, where the standard has fmi2Discard.
+    """
+    said: list[tuple[int, bytes | None]] = []
+    logger = fmi2.fmi2CallbackLoggerTYPE(lambda _, __, status, category, ___: said.append((status, category)))
+    callbacks = fmi2.fmi2CallbackFunctions(logger=logger)
+    description = fmpy.read_model_description(fmu)
+    made = fmi2.FMU2Slave(
+        guid=description.guid, unzipDirectory=fmpy.extract(str(fmu), tmp_path), modelIdentifier="Hovercraft",
+        instanceName="logged",
+    )  # fmt: skip
+    made.instantiate(callbacks=callbacks, loggingOn=True)
+    made.setupExperiment()
+    made.enterInitializationMode()
+    made.exitInitializationMode()
+    made.setReal([BY_NAME["thrust"].reference], [20.0])
+    made.doStep(0.0, 0.1)  # warns
+    with pytest.raises(FMICallException):
+        made.getDirectionalDerivative([3], [0], [1.0])
+    assert made.dll.fmi2GetStatus(made.component, 0, byref(c_int())) == fmi2.fmi2Error
+    with pytest.raises(FMICallException):
+        made.setReal([BY_NAME["mass"].reference], [5.0])
+    made.freeInstance()
+    assert {status for status, _ in said} == {fmi2.fmi2Warning, fmi2.fmi2Error, fmi2.fmi2Fatal}
+    names = {category.decode() for _, category in said if category}
+    assert "cppfmu" in names
+    assert names <= {
+        node.get("name") for node in etree.fromstring(xml(model_description("0", PYTHON))).iter("Category")
+    }
+
+
+# ---- terminals and icon
+
+
+def terminal_file(fmu: Path) -> Any:
+    with zipfile.ZipFile(fmu) as archive:
+        return etree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+
+
+def test_the_icon_lies_in_its_coordinate_system(native3_fmu: Path) -> None:
+    """[3.0: 2.4.9.1] lower left before upper right; without the element the extent would be another one."""
+    graphics = terminal_file(native3_fmu).find("GraphicalRepresentation")
+    assert [node.tag for node in graphics] == ["CoordinateSystem", "Icon"]
+    system, icon = ({key: float(value) for key, value in node.attrib.items()} for node in graphics)
+    assert system["x1"] < system["x2"]
+    assert system["y1"] < system["y2"]
+    assert system["suggestedScalingFactorTo_mm"] > 0.0
+    assert icon == {key: system[key] for key in ("x1", "y1", "x2", "y2")}
+
+
+def test_a_variable_is_named_terminal_and_member(native3_fmu: Path) -> None:
+    """[3.0: 2.4.9.2.2] the suggested scheme; and matching that lets the other side have some members alone."""
+    found = {}
+    for node in terminal_file(native3_fmu).iter("Terminal"):
+        assert node.get("matchingRule") == "bus"
+        found[node.get("name")] = {each.get("memberName"): each.get("variableName") for each in node}
+    assert found == terminals(HOVERCRAFT)
+    assert set(found.pop("actuators")) == {"thrust", "port_thruster", "starboard_thruster"}
+    assert found["wind"] == {"x": "wind.x", "y": "wind.y"}
+    for terminal, members in found.items():
+        assert all(name == f"{terminal}.{member}" and name in BY_NAME for member, name in members.items())
+
+
+def test_the_terminals_of_the_autopilot_pair_with_those_of_the_craft() -> None:
+    craft = terminals(HOVERCRAFT)
+    assert set(terminals(AUTOPILOT_MODEL)) == {"actuators", "pose", "velocity"}
+    for terminal, members in terminals(AUTOPILOT_MODEL).items():
+        assert members.keys() == craft[terminal].keys()
+        for member, name in members.items():
+            ends = {AUTOPILOT_MODEL.by_name[name].causality, BY_NAME[craft[terminal][member]].causality}
+            assert ends == {"input", "output"}
+
+
+@pytest.mark.parametrize("name", ["fmu", "native_fmu", "autopilot"])
+def test_an_fmu_of_fmi_2_has_no_terminals(name: str, request: pytest.FixtureRequest) -> None:
+    """[2.0: 2.3] it may have some, of version 3.0; FMI Library takes that for a fatal error, so there are none."""
+    with zipfile.ZipFile(request.getfixturevalue(name)) as archive:
+        assert not [name for name in archive.namelist() if name.startswith("terminalsAndIcons/")]
+
+
+# ---- what else is in the archive
+
+
+def test_the_license_names_those_of_others(each_fmu: Path) -> None:
+    """[2.0: 2.3; 3.0: 2.5.1] documentation/licenses/license.txt is where to begin."""
+    with zipfile.ZipFile(each_fmu) as archive:
+        folder = "documentation/licenses/"
+        others = {name.removeprefix(folder) for name in archive.namelist() if name.startswith(folder)} - {"license.txt"}
+        named = set(re.findall(r"see (\S+\.txt)", archive.read(f"{folder}license.txt").decode()))
+    assert named == others != set()
+
+
+def test_there_is_a_diagram(each_fmu: Path) -> None:
+    """[2.0: 2.3; 3.0: 2.5.1] documentation/diagram.png, and the page shows it."""
+    with zipfile.ZipFile(each_fmu) as archive:
+        assert archive.read("documentation/diagram.png").startswith(b"\x89PNG")
+        assert 'src="diagram.png"' in archive.read("documentation/index.html").decode()
+
+
+def test_the_reference_result_is_that_of_the_default_experiment(each_fmu: Path) -> None:
+    """[3.0: 2.6; FMI-LS-REF 1.0.0-alpha.1] Where this fails: python -m hovercraft_fmu.studies.pages."""
+    identifier = each_fmu.stem
+    folder = "extra/org.fmi-standard.fmi-ls-ref/"
+    with zipfile.ZipFile(each_fmu) as archive:
+        manifest = etree.fromstring(archive.read(f"{folder}fmi-ls-manifest.xml"))
+        (related,) = manifest
+        result = archive.read(folder + related.get("source"))
+    spaced = "{http://fmi-standard.org/fmi-ls-manifest}"
+    assert manifest.get(f"{spaced}fmi-ls-name") == "org.fmi-standard.fmi-ls-ref"
+    assert all(manifest.get(f"{spaced}fmi-ls-{each}") for each in ("version", "description"))
+    assert (related.get("role"), related.get("type")) == ("result", "text/csv")
+    assert related.get("source") == f"{identifier}_out.csv"
+    assert result == RESULT.read_bytes() == reference_result(each_fmu)
