@@ -208,3 +208,17 @@ def test_a_hundred_thousand_cycles_leave_nothing_behind(unpacked: Unpacked) -> N
     grown = int(printed_by(host(unpacked, "cycles", linked=True)))
     print(f"resident memory grew by {grown} bytes over 90 000 cycles")
     assert grown < 1_000_000
+
+
+@pytest.mark.parametrize("linked", [True, False])
+def test_the_hosts_floating_point_environment_changes_no_bit_and_is_left_as_it_was(
+    linked: bool, unpacked: Unpacked
+) -> None:
+    """Traps, each direction of rounding, flushing to zero, flags: every method, term and use, derivatives, refused
+    values, a motion that leaves the range of numbers, saving and restoring.
+    """
+    if os.uname().machine != "x86_64":
+        pytest.skip("not x86-64: its environments are those of the test")
+    environments, calls = map(int, printed_by(host(unpacked, "environment", linked=linked)).split())
+    assert environments == 10
+    assert calls > 2000

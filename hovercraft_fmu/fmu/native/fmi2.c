@@ -24,8 +24,9 @@ static fmi2Status status_of(enum verdict verdict)
     return verdict == FINE ? fmi2OK : verdict == WARNED ? fmi2Warning : fmi2Error;
 }
 
-/* What comes of a call; it is made where it is permitted. */
-#define STATUS_OF(call, given, made) (permitted(c, call, given) ? status_of(made) : fmi2Error)
+/* What comes of a call: it is made in a floating-point environment of its own, and where it is permitted. */
+#define MADE(call) status_of((instance_enter(c), instance_leave(c, (call))))
+#define STATUS_OF(call, given, made) (permitted(c, call, given) ? MADE(made) : fmi2Error)
 
 /* A message is its own format: it never contains a '%'. */
 static void tell(void *sink, enum verdict verdict, const char *category, const char *message)
@@ -239,12 +240,10 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
         .nextEventTimeDefined = fmi2False,
         .nextEventTime = 0.0,
     };
-    if (!permitted(c, UPDATE_DISCRETE_STATES, info))
-        return fmi2Error;
-    const enum verdict verdict = instance_update_discrete_states(c);
-    if (verdict != REFUSED)
+    const fmi2Status status = STATUS_OF(UPDATE_DISCRETE_STATES, info, instance_update_discrete_states(c));
+    if (status <= fmi2Warning)
         *info = nothing;
-    return status_of(verdict);
+    return status;
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
@@ -256,12 +255,13 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_state
                                        fmi2Boolean *terminate)
 {
     bool event_needed = false;
-    if (!permitted(c, COMPLETE_INTEGRATOR_STEP, enter_event_mode && terminate) ||
-        instance_complete_integrator_step(c, &event_needed) == REFUSED)
-        return fmi2Error;
-    *enter_event_mode = event_needed ? fmi2True : fmi2False;
-    *terminate = fmi2False;
-    return fmi2OK;
+    const fmi2Status status = STATUS_OF(COMPLETE_INTEGRATOR_STEP, enter_event_mode && terminate,
+                                        instance_complete_integrator_step(c, &event_needed));
+    if (status <= fmi2Warning) {
+        *enter_event_mode = event_needed ? fmi2True : fmi2False;
+        *terminate = fmi2False;
+    }
+    return status;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)

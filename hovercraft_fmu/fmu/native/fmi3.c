@@ -24,8 +24,9 @@ static fmi3Status status_of(enum verdict verdict)
     return verdict == FINE ? fmi3OK : verdict == WARNED ? fmi3Warning : fmi3Error;
 }
 
-/* What comes of a call; it is made where it is permitted. */
-#define STATUS_OF(call, given, made) (permitted(c, call, given) ? status_of(made) : fmi3Error)
+/* What comes of a call: it is made in a floating-point environment of its own, and where it is permitted. */
+#define MADE(call) status_of((instance_enter(c), instance_leave(c, (call))))
+#define STATUS_OF(call, given, made) (permitted(c, call, given) ? MADE(made) : fmi3Error)
 
 static void tell(void *sink, enum verdict verdict, const char *category, const char *message)
 {
@@ -129,10 +130,9 @@ void fmi3FreeInstance(fmi3Instance instance)
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
                                        fmi3Float64 start_time, fmi3Boolean stop_time_defined, fmi3Float64 stop_time)
 {
-    const double end = stop_time_defined ? stop_time : INFINITY;
-    if (!permitted(c, SET_UP, true) || instance_set_up(c, start_time, tolerance_defined, tolerance, end) == REFUSED)
-        return fmi3Error;
-    return status_of(instance_initialize(c));
+    const fmi3Status status = STATUS_OF(SET_UP, true, instance_set_up(c, start_time, tolerance_defined, tolerance,
+                                                                      stop_time_defined ? stop_time : INFINITY));
+    return status <= fmi3Warning ? MADE(instance_initialize(c)) : status;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
@@ -181,7 +181,7 @@ static bool is_list_of(struct instance *instance, enum call call, enum kind kind
 
 /* As STATUS_OF, for values of one kind. */
 #define STATUS_OF_LIST(call, kind, made)                                                                               \
-    (permitted(c, call, n == 0 || (vr && values)) && is_list_of(c, call, kind, vr, n, n_values) ? status_of(made)      \
+    (permitted(c, call, n == 0 || (vr && values)) && is_list_of(c, call, kind, vr, n, n_values) ? MADE(made)           \
                                                                                                 : fmi3Error)
 
 static enum verdict get_floats(struct instance *instance, const fmi3ValueReference vr[], size_t n, double values[])
@@ -380,21 +380,21 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[
     if (!permitted(c, GET_OUTPUT_RATES, n == 0 || (vr && orders && values)) ||
         !is_list(c, "fmi3GetOutputDerivatives", n, n_values))
         return fmi3Error;
-    return status_of(instance_get_rates(c, vr, n, orders, values));
+    return MADE(instance_get_rates(c, vr, n, orders, values));
 }
 
 /* The step is made whole or refused: it never returns early, and never ends a run. */
-fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 point, fmi3Float64 step, fmi3Boolean no_set_state_before,
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 point, fmi3Float64 step, fmi3Boolean no_set_state_before,
                       fmi3Boolean *event_handling_needed, fmi3Boolean *terminate, fmi3Boolean *early_return,
                       fmi3Float64 *last_successful_time)
 {
-    struct component *c = instance;
-    if (!permitted(instance, STEP, event_handling_needed && terminate && early_return && last_successful_time))
+    const struct instance *instance = c;
+    if (!permitted(c, STEP, event_handling_needed && terminate && early_return && last_successful_time))
         return fmi3Error;
-    const enum verdict verdict = instance_step(&c->instance, point, step);
+    const fmi3Status status = MADE(instance_step(c, point, step));
     *event_handling_needed = *terminate = *early_return = false;
-    *last_successful_time = c->instance.now.time;
-    return status_of(verdict);
+    *last_successful_time = instance->now.time;
+    return status;
 }
 
 /* ---- model exchange */
@@ -409,15 +409,14 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *need_update, fm
                                     fmi3Boolean *nominals_changed, fmi3Boolean *values_changed,
                                     fmi3Boolean *next_event_defined, fmi3Float64 *next_event)
 {
-    if (!permitted(c, UPDATE_DISCRETE_STATES, need_update && terminate && nominals_changed && values_changed &&
-                                                  next_event_defined && next_event))
-        return fmi3Error;
-    const enum verdict verdict = instance_update_discrete_states(c);
-    if (verdict != REFUSED) {
+    const bool given =
+        need_update && terminate && nominals_changed && values_changed && next_event_defined && next_event;
+    const fmi3Status status = STATUS_OF(UPDATE_DISCRETE_STATES, given, instance_update_discrete_states(c));
+    if (status <= fmi3Warning) {
         *need_update = *terminate = *nominals_changed = *values_changed = *next_event_defined = false;
         *next_event = 0.0;
     }
-    return status_of(verdict);
+    return status;
 }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c)
@@ -429,12 +428,13 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set_state_
                                        fmi3Boolean *terminate)
 {
     bool event_needed = false;
-    if (!permitted(c, COMPLETE_INTEGRATOR_STEP, enter_event_mode && terminate) ||
-        instance_complete_integrator_step(c, &event_needed) == REFUSED)
-        return fmi3Error;
-    *enter_event_mode = event_needed;
-    *terminate = false;
-    return fmi3OK;
+    const fmi3Status status = STATUS_OF(COMPLETE_INTEGRATOR_STEP, enter_event_mode && terminate,
+                                        instance_complete_integrator_step(c, &event_needed));
+    if (status <= fmi3Warning) {
+        *enter_event_mode = event_needed;
+        *terminate = false;
+    }
+    return status;
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time)
@@ -505,8 +505,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
     if (!permitted(c, DIRECTIONAL_DERIVATIVE, given) ||
         !is_seeded(c, DIRECTIONAL_DERIVATIVE, n_seed, n_knowns, n_sensitivity, n_unknowns))
         return fmi3Error;
-    return status_of(
-        instance_directional_derivatives(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
+    return MADE(instance_directional_derivatives(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t n_unknowns,
@@ -517,5 +516,5 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
     if (!permitted(c, ADJOINT_DERIVATIVE, given) ||
         !is_seeded(c, ADJOINT_DERIVATIVE, n_seed, n_unknowns, n_sensitivity, n_knowns))
         return fmi3Error;
-    return status_of(instance_adjoint_derivatives(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
+    return MADE(instance_adjoint_derivatives(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
 }

@@ -34,6 +34,7 @@ void instance_start(struct instance *instance, enum use use, const struct servic
     instance->services = *services;
     instance->warnings = logging;
     instance->errors = true;
+    instance->inside = false;
     instance_reset(instance);
 }
 
@@ -190,8 +191,10 @@ enum verdict instance_restore(struct instance *instance, const struct content *c
 enum verdict instance_keep(struct instance *instance, enum call call, const struct content *content, void **state)
 {
     const struct services *services = &instance->services;
+    const bool inside = instance_go_out(instance);
     if (!*state)
         *state = services->allocate(services->sink, sizeof *content);
+    instance_come_back(instance, inside);
     if (!*state)
         return instance_say(instance, REFUSED, "%s: no memory", call_name(instance, call));
     *(struct content *)*state = *content;
@@ -205,9 +208,11 @@ enum verdict instance_save(struct instance *instance, void **state)
 
 enum verdict instance_forget(struct instance *instance, void **state)
 {
+    const bool inside = instance_go_out(instance);
     if (state && *state) {
         instance->services.release(instance->services.sink, *state);
         *state = NULL;
     }
+    instance_come_back(instance, inside);
     return FINE;
 }

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "environment.h"
 #include "hidden.h"
 #include "linearization.h"
 #include "permits.h"
@@ -61,7 +62,38 @@ struct instance {
     struct services services;
     bool warnings, errors; /* the categories that are logged */
     enum verdict last_step;
+    struct environment host; /* its floating-point environment, while a call is inside */
+    bool inside;
 };
+
+/* Around what a call computes. */
+static inline void instance_enter(struct instance *instance)
+{
+    instance->host = environment_enter();
+    instance->inside = true;
+}
+
+static inline enum verdict instance_leave(struct instance *instance, enum verdict verdict)
+{
+    if (instance->inside)
+        environment_leave(&instance->host);
+    instance->inside = false;
+    return verdict;
+}
+
+/* Around what a call asks of the host. */
+static inline bool instance_go_out(struct instance *instance)
+{
+    const bool inside = instance->inside;
+    instance_leave(instance, FINE);
+    return inside;
+}
+
+static inline void instance_come_back(struct instance *instance, bool inside)
+{
+    if (inside)
+        instance_enter(instance);
+}
 
 /* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. */
 DOOR void instance_start(struct instance *instance, enum use use, const struct services *services, bool logging);

@@ -17,8 +17,10 @@ enum verdict instance_say(struct instance *instance, enum verdict verdict, const
     text_format(message, format, values);
     va_end(values);
     const struct services *services = &instance->services;
+    const bool inside = instance_go_out(instance);
     if (verdict == WARNED ? instance->warnings : instance->errors)
         services->tell(services->sink, verdict, verdict == WARNED ? WARNING_CATEGORY : ERROR_CATEGORY, message);
+    instance_come_back(instance, inside);
     return verdict;
 }
 
