@@ -51,14 +51,18 @@ FIXED_STEP = pytest.mark.parametrize("method", FIXED, ids=lambda each: each.name
 # ---- the map
 
 
+pytestmark = pytest.mark.usefixtures("fleet")
+
+
 def two_craft(motion: Motion) -> Motion:
     """The textbook's and a hard one: 1 g, a thrust of 10^9 N, 10^6 m/s."""
     return motion._replace(crafts=chosen(motion.crafts, slice(0, 2)))
 
 
-@pytest.mark.parametrize("motion", list(map(two_craft, motions())), ids=lambda motion: motion.name)
+@pytest.mark.parametrize("name", ["coasting", "thrust", "spin"])
 @FIXED_STEP
-def test_limits_are_those_of_theory(method: Any, motion: Motion) -> None:
+def test_limits_are_those_of_theory(method: Any, name: str) -> None:
+    motion = next(two_craft(each) for each in motions() if each.name == name)
     for quality, expected in zip(QUALITIES, THEORY[method.name, motion.name], strict=True):
         measured = largest_step(motion, method, quality)
         assert measured[0] == pytest.approx(measured[1], rel=1e-3)  # nothing of the craft is left in them
@@ -278,7 +282,7 @@ def test_the_fmu_agrees_with_the_verdicts(instances: list[Any], method: Any) -> 
                 compared += 1
                 assert watched[0] == pytest.approx(sigma[i], rel=1e-6)  # some hundred roundings
                 # sines of numpy and of Python differ in the last bit
-                difference = _speed_difference(end, judged, i, float(chosen(runs, [i]).craft.drag_center[0]))  # type: ignore[index]
+                difference = _speed_difference(end, judged, i, float(chosen(runs, [i]).craft.drag_center[0]))
                 assert difference <= 1e-11 * judged.numbers.speed[i]
     assert compared > 0.4 * REPEATED
     assert (failed == 0) == (method.name == "drag_implicit")

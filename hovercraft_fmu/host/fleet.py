@@ -3,7 +3,7 @@
 import math
 import platform
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from ctypes import CDLL, POINTER, Structure, byref, c_int32, c_int64, c_void_p
 from dataclasses import fields
 from functools import cache
@@ -38,14 +38,35 @@ class Fleet(NamedTuple):
     """rad, shape (craft,): the largest turn in a sub-step, there too."""
     proposed: Array
     """s, shape (craft,): for the next call with the adaptive method."""
-    refused: dict[int, Exception]
+    refused: "Refused"
     """Number of a craft -> why it was refused: what the model would raise."""
+
+
+class Refused(Mapping[int, Exception]):
+    """Reasons, made when they are asked for."""
+
+    def __init__(self, numbers: NDArray[np.int64], reason: Callable[[int], Exception]) -> None:
+        self.numbers = numbers
+        """Of the craft that were refused, ascending."""
+        self._reason = reason
+
+    def __getitem__(self, number: int) -> Exception:
+        if number not in self.numbers:
+            raise KeyError(number)
+        return self._reason(number)
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self.numbers.tolist())
+
+    def __len__(self) -> int:
+        return len(self.numbers)
 
 
 class Crafts:
     """The constants of many craft, checked once: `Crafts(mass=np.linspace(80.0, 120.0, 1000), air_density=1.1)`.
 
     A parameter of Craft is an array of shape (craft,), or one number that all share; what is not given has its default.
+    As attributes both can be read: `crafts.mass`, `crafts.drag_factor`.
 
     Raises:
         ValueError: the first craft that cannot be, its parameter, the value and the rule; arrays of different lengths.
@@ -67,6 +88,28 @@ class Crafts:
         """What is worked out of them: name -> shape (craft,), or (1,)."""
         for number, why in _refusals(columns, self.derived, count).items():
             raise ValueError(f"craft {number}: {why}" if lengths else why)
+
+    def __getattr__(self, name: str) -> Array:
+        for values in ("columns", "derived"):
+            if name in self.__dict__.get(values, ()):
+                found: Array = self.__dict__[values][name]
+                return found
+        raise AttributeError(name)
+
+    def some(self, which: Any) -> "Crafts":
+        """Some of them: a mask, a slice, or indices. What all share they still do."""
+        made = object.__new__(Crafts)  # they were checked
+        made.columns = {name: column[which] if column.ndim else column for name, column in self.columns.items()}
+        made.derived = {name: row if self.count is None else row[which] for name, row in self.derived.items()}
+        made.count = None if self.count is None else len(next(c for c in made.columns.values() if c.ndim))
+        return made
+
+    def one(self, number: int) -> Craft:
+        """One of them."""
+        values: Any = {
+            name: (column[number] if column.ndim else column).item() for name, column in self.columns.items()
+        }
+        return Craft(**values)
 
     @classmethod
     def of(cls, crafts: "Crafts | Craft | Iterable[Craft]") -> "Crafts":
@@ -122,7 +165,7 @@ def advance_fleet(
 
 
 def observe_fleet(states: Rows, controls: Rows, crafts: Crafts | Craft | Sequence[Craft]) -> Array:
-    """Surge, sway [m/s], force x, y [N, world frame] and moment [N.m] of many craft, shape (5, craft).
+    """Surge, sway [m/s], force x, y [N, world frame], moment [N.m], k*q [kg/s] of many craft, shape (6, craft).
 
     For arguments and errors see `advance_fleet`.
     """
@@ -130,9 +173,9 @@ def observe_fleet(states: Rows, controls: Rows, crafts: Crafts | Craft | Sequenc
     chosen = Crafts.of(crafts)
     count = max([row.size for row in rows if row.ndim], default=chosen.count or 1)
     given = _Given(count, rows, _rows("controls", controls, len(Controls._fields)), chosen, None)
-    seen = np.empty((5, count))
+    seen = np.empty((6, count))
     pointers = [row.ctypes.data for row in seen]
-    _library().fleet_observe(byref(given.structure), (c_void_p * 2)(*pointers[:2]), (c_void_p * 3)(*pointers[2:]))
+    _library().fleet_observe(byref(given.structure), (c_void_p * 2)(*pointers[:2]), (c_void_p * 4)(*pointers[2:]))
     return seen
 
 
@@ -154,14 +197,24 @@ def _refusals(parameters: Mapping[str, Array], derived: Mapping[str, Array], cou
     with np.errstate(invalid="ignore"):
         doubtful |= ~(parameters["thrust_max"] - parameters["thrust_min"] >= 0.0)
     doubtful |= ~np.isfinite(list(derived.values())).all(axis=0)
-    found = {}
-    for i in np.flatnonzero(doubtful).tolist():
-        values: Any = {name: (column[i] if column.ndim else column).item() for name, column in parameters.items()}
-        try:
-            Craft(**values)
-        except ValueError as error:
-            found[i] = str(error)
-    return found
+    reasons = {i: _refusal(_constants(parameters, i)) for i in np.flatnonzero(doubtful).tolist()}
+    return {i: why for i, why in reasons.items() if why}
+
+
+def _refusal(constants: Any) -> str:
+    """Why there cannot be such a craft; '' where there can."""
+    try:
+        Craft(**constants)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def _constants(parameters: Mapping[str, Array], i: int) -> Any:
+    """Of one craft, for Craft."""
+    numbers = _numbers(tuple(parameters), list(parameters.values()), i)
+    area = numbers["drag_area"]
+    return numbers | {"drag_area": int(area) if area.is_integer() else area}
 
 
 def _is_right(name: str, column: Array) -> bool:
@@ -286,7 +339,7 @@ class _Found:
 
     def fleet(self, numbers: Callable[[int], dict[str, float]]) -> Fleet:
         """`numbers` gives those of a craft by name."""
-        refused = {i: self._error(i, numbers(i)) for i in np.flatnonzero(self._why).tolist()}
+        refused = Refused(np.flatnonzero(self._why), lambda i: self._error(i, numbers(i)))
         drag_mass, rotation, proposed = (self._reals[name] for name in ("drag_mass", "rotation", "proposed"))
         return Fleet(self._states, self._substeps, drag_mass, rotation, proposed, refused)
 
@@ -323,5 +376,5 @@ def _library() -> Any:
     library.fleet_advance.restype = c_int64
     library.fleet_advance.argtypes = (POINTER(_CFleet), POINTER(_Way), POINTER(_CReached))
     library.fleet_derived.argtypes = (POINTER(_CFleet), c_void_p)
-    library.fleet_observe.argtypes = (POINTER(_CFleet), c_void_p * 2, c_void_p * 3)
+    library.fleet_observe.argtypes = (POINTER(_CFleet), c_void_p * 2, c_void_p * 4)
     return library

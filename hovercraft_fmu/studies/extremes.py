@@ -1,8 +1,7 @@
 """Random extremes: what each method makes of them, held against a bound; derived at the top of stability.py."""
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias, cast
 
@@ -10,10 +9,11 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from ..host.fleet import Crafts, advance_fleet, observe_fleet
 from ..model.craft import DIRECTIONAL, Craft
-from ..model.dynamics import Controls, State, actuation, drag_per_speed, friction_gains, friction_radius
-from ..model.integrators import INTEGRATORS, Integrate, Integrator, Stretch
-from ..model.subcycling import stability_number
+from ..model.dynamics import Controls, State, friction_radius
+from ..model.integrators import INTEGRATORS, Integrator
+from ..model.subcycling import Settings
 from .laboratory import Tell
 
 Array: TypeAlias = Any
@@ -29,7 +29,7 @@ ADAPTIVE = next(method for method in INTEGRATORS if not method.integrate)
 class Batch(NamedTuple):
     """Runs to be made: every number is an array of shape (runs,)."""
 
-    craft: Craft
+    craft: Crafts
     controls: Controls
     start: State
     h: Array
@@ -38,33 +38,65 @@ class Batch(NamedTuple):
     """of each run"""
 
 
-def mapped(batch: Batch, function: Callable[[Array], Any]) -> Batch:
-    """The batch with a function applied to every array."""
-    craft: Any = {field.name: function(getattr(batch.craft, field.name)) for field in fields(Craft)}
-    controls, start = Controls(*map(function, batch.controls)), State(*map(function, batch.start))
-    return Batch(Craft(**craft), controls, start, function(batch.h), batch.substeps)
-
-
-def made(craft: Craft, controls: Controls, start: State, h: Array, substeps: int = 1) -> Batch:
+def made(craft: Crafts, controls: Controls, start: State, h: Array, substeps: int = 1) -> Batch:
     """A batch in which everything has the shape of h: plain floats serve all runs alike."""
-    return mapped(Batch(craft, controls, start, h, substeps), lambda value: np.broadcast_to(value, h.shape))
+
+    def each(values: Iterable[Any]) -> Iterator[Any]:
+        return (np.broadcast_to(value, h.shape) for value in values)
+
+    return Batch(craft, Controls(*each(controls)), State(*each(start)), h, substeps)
 
 
 def chosen(batch: Batch, which: Any) -> Batch:
     """Some of the runs: a mask, a slice, or indices."""
-    return mapped(batch, lambda value: value[which])
+    craft, controls, start, h, substeps = batch
+    held, at = ([value[which] for value in cast(Any, values)] for values in (controls, start))
+    return Batch(craft.some(which), Controls(*held), State(*at), h[which], substeps)
 
 
-def single(batch: Batch, i: int) -> Batch:
-    """One of the runs, in plain numbers."""
-    return mapped(batch, lambda value: value[i].item())
+class Run(NamedTuple):
+    """One run, in plain numbers."""
+
+    craft: Craft
+    controls: Controls
+    start: State
+    h: float
+    """s"""
+    substeps: int
 
 
-def advanced(batch: Batch, method: Integrator, state: State, n: int, refined: int = 1) -> Stretch:
+def single(batch: Batch, i: int) -> Run:
+    """One of the runs."""
+    held, at = ([value[i].item() for value in cast(Any, values)] for values in (batch.controls, batch.start))
+    return Run(batch.craft.one(i), Controls(*held), State(*at), batch.h[i].item(), batch.substeps)
+
+
+class Reached(NamedTuple):
+    """What a number of sub-steps made of a batch; NaN where a motion left the numbers."""
+
+    state: State
+    drag_mass: Array
+    """kg"""
+    rotation: Array
+    """rad"""
+
+
+def advanced(batch: Batch, method: Integrator, state: State, n: int, refined: int = 1) -> Reached:
     """Every craft of the batch n sub-steps after a state, each cut into so many; motions may leave the numbers."""
-    with np.errstate(all="ignore"):
-        integrate = cast(Integrate, method.integrate)
-        return integrate(state, batch.controls, batch.craft, batch.h / refined, n * refined, np)
+    h = batch.h / refined
+    fleet = advance_fleet(state, batch.controls, batch.craft, h * (n * refined), Settings(h, method))
+    lost = fleet.refused.numbers
+    for values in (*fleet.states, fleet.drag_mass, fleet.rotation):
+        values[lost] = np.nan
+    return Reached(State(*fleet.states), fleet.drag_mass, fleet.rotation)
+
+
+def actuation(batch: Batch) -> tuple[Array, Array, Array]:
+    """Thrust [N], side force [N] and moment [N.m] of the thrusters, after saturation."""
+    controls, craft = batch.controls, batch.craft
+    thrust = np.clip(controls.thrust, craft.thrust_min, craft.thrust_max)
+    command = np.clip(controls.port, 0.0, 1.0) - np.clip(controls.starboard, 0.0, 1.0)
+    return thrust, craft.steering_force * command, craft.thruster_moment * command
 
 
 # ---- the numbers of the study
@@ -89,11 +121,11 @@ ROUNDING = 1e-11
 
 def own_steps(rng: np.random.Generator, runs: Batch) -> Array:
     """s: 1e-5 to 3 times the time in which the craft's motion changes, at most 10 s."""
-    thrust, side, turn = actuation(runs.controls, runs.craft, np)
+    thrust, side, turn = actuation(runs)
     craft, k = runs.craft, runs.craft.drag_factor
     force = np.abs(thrust) + np.abs(side) + np.abs(turn / craft.length)
     # drag at the speed of the start and at the terminal speed, rotation now and by the thrusters
-    drag = craft.drag_rate * (drag_per_speed(runs.start, runs.controls, craft, np) + np.sqrt(k * force))
+    drag = craft.drag_rate * (observe_fleet(runs.start, runs.controls, craft)[5] + np.sqrt(k * force))
     rotation = np.abs(runs.start.yaw_rate) + np.sqrt(np.abs(turn) / craft.inertia)
     return np.minimum(_logarithmic(rng, 1e-5, 3.0, len(runs.h)) / (drag + rotation + 1e-6), 10.0)
 
@@ -119,12 +151,12 @@ def sample(rng: np.random.Generator, count: int, substeps: int, sampling: str) -
         return np.where(rng.random(count) < zeros, 0.0, rng.random(count))
 
     limit = spread(1e-3, 1e9)
-    craft = Craft(
-        mass=_logarithmic(rng, 1e-3, 1e6, count), inertia=_logarithmic(rng, 1e-3, 1e6, count),
-        length=_logarithmic(rng, 0.1, 100.0, count), air_density=spread(1e-6, 1e3),
-        drag_center_fraction=-0.5 * command(0.05), steering_force=spread(1e-3, 1e9),
-        thrust_min=-limit, thrust_max=limit,
-    )  # fmt: skip
+    parameters: dict[str, Array] = {
+        "mass": _logarithmic(rng, 1e-3, 1e6, count), "inertia": _logarithmic(rng, 1e-3, 1e6, count),
+        "length": _logarithmic(rng, 0.1, 100.0, count), "air_density": spread(1e-6, 1e3),
+        "drag_center_fraction": -0.5 * command(0.05), "steering_force": spread(1e-3, 1e9),
+        "thrust_min": -limit, "thrust_max": limit,
+    }  # fmt: skip
     controls = Controls(limit * (2.0 * command(0.1) - 1.0), command(0.4), command(0.4))
     speed, course = spread(1e-6, 1e6), np.pi * (2.0 * command(0.0) - 1.0)
     start = State(
@@ -133,10 +165,10 @@ def sample(rng: np.random.Generator, count: int, substeps: int, sampling: str) -
     )  # fmt: skip
     if sampling == WITH_TERMS:
         areas, spins, friction = rng.integers(1, 3, count), command(0.4), spread(1e-6, 10.0, 0.4)
-        craft = replace(craft, drag_area=cast(Any, areas), rotational_drag=spins, skirt_friction=friction)
+        parameters |= {"drag_area": areas, "rotational_drag": spins, "skirt_friction": friction}
         blows, from_where = spread(1e-6, 1e6, 0.4), 2.0 * np.pi * command(0.0)
         controls = controls._replace(wind_x=blows * np.cos(from_where), wind_y=blows * np.sin(from_where))
-    runs = made(craft, controls, start, np.ones(count), substeps)
+    runs = made(Crafts(**parameters), controls, start, np.ones(count), substeps)
     return runs._replace(h=SAMPLINGS[sampling](rng, runs))
 
 
@@ -168,7 +200,7 @@ def watched(runs: Batch, method: Integrator) -> Numbers:
         for _ in range(runs.substeps):
             stretch = advanced(runs, method, state, 1)
             state = stretch.state
-            sigma = np.fmax(sigma, stability_number(stretch.drag_mass, stretch.rotation, craft))
+            sigma = np.fmax(sigma, stretch.drag_mass * craft.drag_rate + stretch.rotation * craft.spin_rate)
             drag, rho = np.fmax(drag, stretch.drag_mass), np.fmax(rho, stretch.rotation)
             speed = np.fmax(speed, _size(state.vx, state.vy, state.yaw_rate, craft))
             finite &= np.isfinite(np.sum(state, axis=0))
@@ -179,20 +211,20 @@ def watched(runs: Batch, method: Integrator) -> Numbers:
 def _swing(runs: Batch, drag: Array) -> Array:
     """1: tau, from the largest h*k*q [kg]; k*q^2 = (k*q)^2/k, and without drag nothing."""
     craft, k = runs.craft, runs.craft.drag_factor
-    turn = np.abs(actuation(runs.controls, craft, np)[2])
+    turn = np.abs(actuation(runs)[2])
     least = np.where(craft.drag_area == DIRECTIONAL, np.fmin(craft.drag_factor_ahead, craft.drag_factor_abeam), k)
     pressure = np.divide(drag * drag, least, out=np.zeros_like(drag), where=k > 0.0)
     return (np.abs(craft.drag_center) * pressure + runs.h * runs.h * turn) / craft.inertia
 
 
-def _size(vx: Any, vy: Any, yaw_rate: Any, craft: Craft) -> Array:
+def _size(vx: Any, vy: Any, yaw_rate: Any, craft: Crafts) -> Array:
     """m/s: the speed of the centre of gravity, or of the drag point about it, whichever is larger."""
     return np.fmax(np.hypot(vx, vy), np.abs(craft.drag_center * yaw_rate))
 
 
 def _gain(runs: Batch) -> Array:
     """m/s: what thrust and thrusters add to the speed in a sub-step."""
-    thrust, side, turn = actuation(runs.controls, runs.craft, np)
+    thrust, side, turn = actuation(runs)
     craft = runs.craft
     return runs.h * _size(thrust / craft.mass, side / craft.mass, turn / craft.inertia, craft)
 
@@ -200,10 +232,11 @@ def _gain(runs: Batch) -> Array:
 def _grip(runs: Batch) -> Array:
     """m/s: what friction takes of the speed in a sub-step, of the centre of gravity or of the drag point about it."""
     craft = runs.craft
-    if not craft.rubs:
+    if not np.any(craft.skirt_friction):
         return np.zeros_like(runs.h)
-    straight, turning = friction_gains(craft, runs.h, np)
-    return np.fmax(straight, turning * np.abs(craft.drag_center) / friction_radius(craft, np))
+    radius = np.array([friction_radius(craft.one(i)) for i in range(len(runs.h))])
+    straight, turning = craft.friction_force / craft.mass, craft.friction_force * radius / craft.inertia
+    return runs.h * np.fmax(straight, turning * np.abs(craft.drag_center))
 
 
 def _per(value: Array, speed: Array) -> Array:
@@ -294,7 +327,7 @@ def _where(checked: Mask, needed: NDArray[Any], values: Array) -> Array:
     return np.where(checked, whole, np.nan)
 
 
-def _difference(a: State, b: State, craft: Craft) -> Array:
+def _difference(a: State, b: State, craft: Crafts) -> Array:
     with np.errstate(all="ignore"):
         return _size(a.vx - b.vx, a.vy - b.vy, a.yaw_rate - b.yaw_rate, craft)
 

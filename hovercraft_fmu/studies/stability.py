@@ -56,7 +56,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import polars as pl
 
-from ..model.craft import Craft
+from ..host.fleet import Crafts
 from ..model.dynamics import Controls, State
 from ..model.integrators import Integrator
 from ..view.palette import INK, METHODS, QUIET
@@ -100,7 +100,7 @@ class Motion(NamedTuple):
         """1: where a run starts, in units of the scale; by the terminal speed a little below it."""
         return 1.0 - NEAR * self.goal
 
-    def speed(self, state: State, craft: Craft) -> Array:
+    def speed(self, state: State, craft: Any) -> Array:
         """m/s: ahead; in a spin, that of the drag point abeam."""
         if not np.any(self.crafts.start.yaw_rate):
             return state.vx
@@ -136,11 +136,11 @@ def motions() -> tuple[Motion, ...]:
     fraction: Array = np.array([-0.25, -0.5, 0.0, -0.5, -0.5, 0.0, -0.1, -0.25])
     speed: Array = np.array([2.0, 1e6, 1e3, 1e6, 1e-3, 1e6, 1.0, 1e-6])
     thrust: Array = np.array([5.0, 1e9, 1.0, 1e-3, 1e9, 1e6, 1e-6, 1e9])
-    craft = Craft(mass=mass, air_density=density, drag_center_fraction=fraction, thrust_max=thrust)
+    craft = Crafts(mass=mass, air_density=density, drag_center_fraction=fraction, thrust_max=thrust)
     k = craft.drag_factor
     terminal = np.sqrt(thrust / k)
     # in the spin the point of drag must stop long before the craft has turned: a light craft in a dense medium
-    thin = Craft(mass=mass, inertia=np.minimum(500.0, 1e-3 * mass), air_density=1e3, drag_center_fraction=-0.5)
+    thin = Crafts(mass=mass, inertia=np.minimum(500.0, 1e-3 * mass), air_density=1e3, drag_center_fraction=-0.5)
     lever = thin.drag_factor * (1.0 / thin.mass + thin.drag_center**2 / thin.inertia)
     spinning = State(yaw_rate=speed / thin.drag_center)
     return (

@@ -406,9 +406,10 @@ int32_t fleet_derived(const struct fleet *fleet, double *derived)
     return 0;
 }
 
-int32_t fleet_observe(const struct fleet *fleet, double *const motion[2], double *const loads[3])
+int32_t fleet_observe(const struct fleet *fleet, double *const motion[2], double *const loads[4])
 {
-    if (!is_fleet(fleet) || !motion || !loads || !motion[0] || !motion[1] || !loads[0] || !loads[1] || !loads[2])
+    if (!is_fleet(fleet) || !motion || !loads || !motion[0] || !motion[1] || !loads[0] || !loads[1] || !loads[2] ||
+        !loads[3])
         return -1;
     for (int64_t i = 0; i < fleet->count; i++) {
         const struct state state = state_at(fleet, i);
@@ -419,6 +420,7 @@ int32_t fleet_observe(const struct fleet *fleet, double *const motion[2], double
         loads[0][i] = on.x;
         loads[1][i] = on.y;
         loads[2][i] = on.moment;
+        loads[3][i] = on.kq;
     }
     return 0;
 }

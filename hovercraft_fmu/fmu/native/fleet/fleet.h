@@ -55,7 +55,7 @@ enum refusal { MOVED, TOO_MANY, RUNAWAY, TOO_SMALL, NOT_A_STEP, NOT_A_NUMBER };
 FLEET_EXPORT int64_t fleet_advance(const struct fleet *fleet, const struct way *way, const struct reached *reached);
 /* Number k in struct derived of craft i goes to derived[k * count + i]. */
 FLEET_EXPORT int32_t fleet_derived(const struct fleet *fleet, double *derived);
-/* Surge, sway [m/s]; force x, y [N], moment [N.m]; no slopes. */
-FLEET_EXPORT int32_t fleet_observe(const struct fleet *fleet, double *const motion[2], double *const loads[3]);
+/* Surge, sway [m/s]; force x, y [N], moment [N.m], k*q [kg/s]; no slopes. */
+FLEET_EXPORT int32_t fleet_observe(const struct fleet *fleet, double *const motion[2], double *const loads[4]);
 
 #endif
