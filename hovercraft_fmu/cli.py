@@ -355,7 +355,7 @@ def sweep_command(
         OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
     _print_extremes(outcome.folder)
     if plot:
-        from .sweep.plots import plot_sweep
+        from .sweep.charts import plot_sweep
 
         OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
 

@@ -164,7 +164,7 @@ def test_the_icon_lies_in_its_coordinate_system(native3_fmu: Path) -> None:
 
 
 def test_a_variable_is_named_terminal_and_member(native3_fmu: Path) -> None:
-    """[3.0: 2.4.9.2.2] the suggested scheme; and matching that lets the other side have some members alone."""
+    """[3.0: 2.4.9.2] the suggested scheme; and matching that lets the other side have some members alone."""
     found = {}
     for node in terminal_file(native3_fmu).iter("Terminal"):
         assert node.get("matchingRule") == "bus"

@@ -6,6 +6,7 @@ import math
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import fmpy.ssp
 import numpy as np
@@ -14,7 +15,7 @@ from click.testing import CliRunner
 from lxml import etree
 from PIL import Image
 
-from hovercraft_fmu.autopilot.pilot_interface import COMMANDS
+from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.coupling import (
     COLUMNS,
@@ -29,7 +30,7 @@ from hovercraft_fmu.coupling import (
     sail,
     sail_bare,
 )
-from hovercraft_fmu.fmu.interface import STATES
+from hovercraft_fmu.fmu.interface import HOVERCRAFT, STATES
 from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.hosts import HOSTS
 from hovercraft_fmu.model.integrators import integrator
@@ -256,6 +257,7 @@ def test_the_ssp_is_valid_whole_and_the_same_every_time(each_fmu: Path, autopilo
         structure = etree.fromstring(archive.read("SystemStructure.ssd"))
         values = etree.fromstring(archive.read("resources/hovercraft.ssv"))
     etree.XMLSchema(file=str(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(structure)
+    assert_units_are_told(structure)
     etree.XMLSchema(file=str(SCHEMAS / "SystemStructureParameterValues.xsd")).assertValid(values)
     assert structure.get("version") == "1.0"
     kinds = structure.xpath("//*[local-name() = 'Annotation']/@type")
@@ -268,6 +270,17 @@ def test_the_ssp_is_valid_whole_and_the_same_every_time(each_fmu: Path, autopilo
 
 
 # ---- the commands
+
+
+def assert_units_are_told(structure: Any) -> None:
+    """SSP 1.0, connectors and units: a connector has the unit of its variable, and each unit is defined."""
+    defined = {node.get("name") for node in structure.iter("{*}Unit")}
+    for component in structure.iter("{*}Component"):
+        variables = (AUTOPILOT_MODEL if component.get("name") == "autopilot" else HOVERCRAFT).by_name
+        for connector in component.iter("{*}Connector"):
+            (kind,) = connector
+            assert kind.get("unit") == variables[connector.get("name")].unit
+            assert kind.get("unit") in {None, *defined}
 
 
 @pytest.mark.once

@@ -41,7 +41,7 @@ def build_description(flavour: Flavour, options: Iterable[str]) -> Element:
 def terminals(model: Model) -> dict[str, dict[str, str]]:
     """Terminal -> member -> variable: inputs and outputs that belong together, what a host may connect at once.
 
-    By the scheme that FMI 3.0.2 suggests (2.4.9.2.2) a variable is named TERMINAL.MEMBER; and there are the commands.
+    By the scheme that FMI 3.0.2 suggests (2.4.9.2) a variable is named TERMINAL.MEMBER; and there are the commands.
     """
     found: dict[str, dict[str, str]] = {}
     for variable in model.variables:

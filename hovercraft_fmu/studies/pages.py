@@ -30,7 +30,7 @@ from ..model.integrators import INTEGRATORS
 from ..scenes import CONTROL_LOGS, SCENES, VOYAGES
 from ..simulation import plan, run_model
 from ..sweep import sweep
-from ..sweep.plots import plot_sweep
+from ..sweep.charts import plot_sweep
 from ..sweep.study import SHIPPED
 from ..view.diagram import draw_diagram
 from ..view.plots import plot_passage, plot_run
