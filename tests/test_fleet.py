@@ -223,7 +223,7 @@ def test_what_is_seen_of_them(kernel: Kernel) -> None:
         states[4] = State(heading=0.3)
         seen = observe_fleet(columns(states), columns(controls), crafts)
         for i, (state, held, craft) in enumerate(zip(states, controls, crafts, strict=True)):
-            assert tuple(seen[2:, i]) == kernel.loads(state, held, craft)[:3]
+            assert tuple(seen[2:, i]) == kernel.loads(state, held, craft)
             surge, sway = math.cos(state.heading), math.sin(state.heading)
             forward = surge * state.vx + sway * state.vy
             assert seen[0, i] == pytest.approx(forward, rel=1e-12, abs=1e-14 * math.hypot(state.vx, state.vy))

@@ -106,10 +106,7 @@ class Crafts:
 
     def one(self, number: int) -> Craft:
         """One of them."""
-        values: Any = {
-            name: (column[number] if column.ndim else column).item() for name, column in self.columns.items()
-        }
-        return Craft(**values)
+        return Craft(**_constants(self.columns, number))
 
     @classmethod
     def of(cls, crafts: "Crafts | Craft | Iterable[Craft]") -> "Crafts":
