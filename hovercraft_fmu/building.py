@@ -14,10 +14,12 @@ from xml.etree.ElementTree import ParseError, fromstring
 from ._version import __version__
 from .autopilot.pilot_package import CONTENT as AUTOPILOT_CONTENT
 from .autopilot.pilot_package import build_autopilot
-from .fmu.description import NATIVE, NATIVE3, guid
+from .fmu.block import guid
+from .fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from .fmu.machine_code import identity
 from .fmu.native_package import build_native_fmu
-from .fmu.python_package import HOVERCRAFT_CONTENT, build_fmu, python_identity
+from .fmu.python_package import build_fmu, hovercraft_content, python_identity
+from .fmu.start_values import Value, variant
 from .ssp import build_ssp
 
 Kind: TypeAlias = Literal["native", "native3", "python", "autopilot", "native_loop", "native3_loop", "python_loop"]
@@ -35,11 +37,21 @@ class Product(NamedTuple):
     """Of an FMU: what it is, in 32 hexadecimal digits."""
 
 
-def _write_loop(kind: Kind) -> Callable[[Path], Path]:
+FLAVOURS: Mapping[str, Flavour] = MappingProxyType({"native": NATIVE, "native3": NATIVE3, "python": PYTHON})
+"""The FMUs of the hovercraft, by kind."""
+LOOPS: Mapping[str, str] = MappingProxyType({f"{kind}_loop": kind for kind in FLAVOURS})
+"""A closed loop -> the kind of the FMU in it."""
+
+
+def _craft(flavour: Flavour) -> Callable[[Path], Path]:
+    return lambda path: (build_native_fmu if flavour.parts else build_fmu)(path, flavour)
+
+
+def _loop(flavour: Flavour) -> Callable[[Path], Path]:
     def write(path: Path) -> Path:
         with TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
-            craft, autopilot = (build(each, Path(folder) / PRODUCTS[each].name) for each in (kind, "autopilot"))
-            return build_ssp(path, craft, autopilot)
+            craft = _craft(flavour)(Path(folder) / f"{flavour.identifier}.fmu")
+            return build_ssp(path, craft, build("autopilot", Path(folder) / PRODUCTS["autopilot"].name))
 
     return write
 
@@ -49,20 +61,20 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
         "native": Product(
             "HovercraftNative.fmu",
             "FMI 2.0, machine code: for every tool; needs nothing",
-            lambda path: build_native_fmu(path, NATIVE),
+            _craft(NATIVE),
             lambda: identity(NATIVE),
         ),
         "native3": Product(
             "HovercraftNative3.fmu",
             "FMI 3.0, machine code: for tools that want FMI 3.0, and for arm64 Linux in fmpy",
-            lambda path: build_native_fmu(path, NATIVE3),
+            _craft(NATIVE3),
             lambda: identity(NATIVE3),
         ),
         "python": Product(
             "Hovercraft.fmu",
             "FMI 2.0, Python: to read or change the model; needs Python 3.10 or newer where it runs",
-            build_fmu,
-            lambda: python_identity(HOVERCRAFT_CONTENT),
+            _craft(PYTHON),
+            lambda: python_identity(hovercraft_content(PYTHON)),
         ),
         "autopilot": Product(
             "Autopilot.fmu",
@@ -73,37 +85,63 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
         "native_loop": Product(
             "HovercraftNativeLoop.ssp",
             "SSP 1.0: the closed loop of HovercraftNative.fmu and Autopilot.fmu, for co-simulation masters",
-            _write_loop("native"),
+            _loop(NATIVE),
         ),
         "native3_loop": Product(
             "HovercraftNative3Loop.ssp",
             "SSP 1.0: the same loop with HovercraftNative3.fmu",
-            _write_loop("native3"),
+            _loop(NATIVE3),
         ),
         "python_loop": Product(
             "HovercraftLoop.ssp",
             "SSP 1.0: the same loop with Hovercraft.fmu",
-            _write_loop("python"),
+            _loop(PYTHON),
         ),
     }
 )
 assert tuple(PRODUCTS) == get_args(Kind)
 
 
-def build(kind: Kind = "native", path: str | os.PathLike[str] | None = None) -> Path:
+def build(
+    kind: Kind = "native",
+    path: str | os.PathLike[str] | None = None,
+    *,
+    name: str | None = None,
+    preset: str | None = None,
+    start_values: Mapping[str, Value] | None = None,
+) -> Path:
     """Write a file of that kind to `path` (its folder is made) and return the path; two builds give the same bytes.
 
     Args:
         kind: what: the key of a row of PRODUCTS.
-        path: the file; without it that of PRODUCTS, in build/.
+        path: the file; without it that of PRODUCTS, or the name given here, in build/.
+        name: of an FMU with start values of its own: a C identifier. (Of a loop: of the FMU in it.)
+        preset: a craft whose values those are.
+        start_values: and others, by name; they come after the preset's.
 
     Raises:
-        ValueError: no such kind, or the name does not end in .fmu (.ssp for a loop).
+        ValueError: no such kind, or the path does not end in .fmu (.ssp for a loop); a name, preset or start value that
+            cannot be.
         NotCompiledError: there is no machine code for a native one; the message says how to get it.
         OSError: the file cannot be written; one that stood there before still does.
     """
-    chosen = product(kind)
+    chosen = product(kind) if name is None else variant_product(kind, name, preset, start_values)
+    if name is None and (preset or start_values):
+        raise ValueError("name: must be given, as an FMU with start values of its own is not to be taken for another")
     return chosen.write(Path(path or FOLDER / chosen.name))
+
+
+def variant_product(kind: str, name: str, preset: str | None, start_values: Mapping[str, Value] | None) -> Product:
+    """A row for an FMU with start values of its own, or a loop with it. Raises ValueError as `build` does."""
+    row, ordinary = product(kind), FLAVOURS.get(LOOPS.get(kind, kind))
+    if ordinary is None:
+        can = ", ".join((*FLAVOURS, *LOOPS))
+        raise ValueError(f"kind = {kind!r}: must be one of {can} to have start values of its own")
+    flavour = variant(ordinary, name, start_values, preset)
+    purpose = "; ".join(filter(None, (row.purpose, flavour.model.listed(flavour.own_starts))))
+    if kind in LOOPS:
+        return Product(f"{name}Loop.ssp", purpose, _loop(flavour))
+    return Product(f"{name}.fmu", purpose, _craft(flavour))
 
 
 def product(kind: str) -> Product:

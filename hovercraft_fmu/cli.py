@@ -26,7 +26,17 @@ from rich.table import Table
 from rich.text import Text
 
 from ._version import __version__
-from .building import FOLDER, PRODUCTS, Kind, Product, build, default_fmu, default_kind, product
+from .building import (
+    FOLDER,
+    PRODUCTS,
+    Kind,
+    Product,
+    build,
+    default_fmu,
+    default_kind,
+    product,
+    variant_product,
+)
 from .coupling import Passage, sail
 from .fmu.machine_code import NotCompiledError
 from .host import SimulationError
@@ -85,12 +95,25 @@ def commands(context: click.Context) -> None:
 @click.option(
     "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", default=FOLDER, show_default=True
 )
-def build_command(kinds: tuple[str, ...], output: Path) -> None:
+@click.option("--name", metavar="NAME", help="Write one FMU under this name, with start values of its own.")
+@click.option("--preset", metavar="NAME", help=f"With --name: those of a craft: {', '.join(PRESETS)}.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="With --name: a start value; repeatable.")
+def build_command(
+    kinds: tuple[str, ...], output: Path, name: str | None, preset: str | None, settings: tuple[str, ...]
+) -> None:
     """Write the FMUs and the SSP files of the closed loop.
 
-    KIND is native, native3, python, autopilot, native_loop, native3_loop or python_loop; without it all are written.
+    KIND is native, native3, python, autopilot, native_loop, native3_loop or python_loop; without it all are written,
+    and with --name the native FMU alone.
     """
-    wanted = [product(kind) for kind in kinds] or list(PRODUCTS.values())
+    if name is not None:
+        if len(kinds) > 1:
+            raise click.UsageError("--name: must be given with one KIND: it is the name of one file")
+        wanted = [variant_product(kinds[0] if kinds else "native", name, preset, _settings(settings))]
+    elif preset or settings:
+        raise click.UsageError("--preset and --set: must be given with --name, the name of an FMU with those values")
+    else:
+        wanted = [product(kind) for kind in kinds] or list(PRODUCTS.values())
     reasons = {each.name: _written(each, output / each.name) for each in wanted}
     if missing := [name for name, reason in reasons.items() if reason]:
         raise click.ClickException(f"not written: {', '.join(missing)}; {reasons[missing[0]]}")

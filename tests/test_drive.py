@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from hovercraft_fmu.fmu.icon import outline
 from hovercraft_fmu.fmu.interface import STATES
+from hovercraft_fmu.fmu.start_values import Value
 from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.model.dynamics import State
-from hovercraft_fmu.simulation import Value, read_inputs, simulate
+from hovercraft_fmu.simulation import read_inputs, simulate
 from hovercraft_fmu.view.drive import drive, plan_drive
 from hovercraft_fmu.view.operator import TIME_SCALE
 from hovercraft_fmu.view.palette import HULL, WARNING

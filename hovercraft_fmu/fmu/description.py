@@ -7,6 +7,7 @@ from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .._version import RELEASE_DATE, __version__
+from .block import guid
 from .interface import CRAFT_PARAMETERS, DERIVATIVES, HOVERCRAFT, INPUTS, STATES, TIME
 from .variable import Kind, Model, Variable
 
@@ -58,6 +59,7 @@ PARTS = (
     "text.c",
     "trig.c",
     "variables.c",
+    "variant.c",
 )
 """Whatever the standard."""
 LOG_CATEGORIES = {
@@ -89,6 +91,8 @@ class Flavour:
     """Files of C in sources/, which `unit` includes."""
     fmi: Literal[2, 3] = 2
     """The version of the standard."""
+    variant_of: "Flavour | None" = None
+    """Whose code it has, with start values of its own."""
 
     @property
     def unit(self) -> str:
@@ -98,6 +102,21 @@ class Flavour:
     def of(self, model: Model) -> "Flavour":
         """The same kind of FMU of another model."""
         return replace(self, model=model, identifier=model.name)
+
+    def variant(self, name: str, starts: Mapping[str, float | int]) -> "Flavour":
+        """The same FMU under another name, with start values of its own. Where skirt and ground rub it offers no model
+        exchange.
+        """
+        model = self.model.variant(name, starts)
+        rubs = "skirt_friction" in model.by_name and model.by_name["skirt_friction"].start
+        return replace(self.of(model), exchange={} if rubs else self.exchange, variant_of=self)
+
+    @property
+    def own_starts(self) -> dict[str, float | int]:
+        """The start values of a variant that are its own, by name."""
+        before = (self.variant_of or self).model.by_name
+        starts = {v.name: v.start for v in self.model.variables if v.start is not None}
+        return {name: start for name, start in starts.items() if repr(start) != repr(before[name].start)}
 
 
 PYTHON = Flavour(
@@ -200,11 +219,6 @@ def xml(root: Element) -> bytes:
     indent(root)
     text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
     return text + b"\n"
-
-
-def guid(build: str) -> str:
-    """A digest in the shape of a GUID."""
-    return f"{{{build[:8]}-{build[8:12]}-{build[12:16]}-{build[16:20]}-{build[20:32]}}}"
 
 
 def _interface(parent: Element, name: str, flavour: Flavour, capabilities: Mapping[str, str]) -> None:

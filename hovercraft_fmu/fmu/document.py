@@ -13,7 +13,7 @@ from .._version import __version__
 from ..model.craft import DRAG_AREAS, PRESETS
 from ..model.integrators import INTEGRATORS
 from .description import FMI_3_TYPES, NATIVE, NATIVE3, PYTHON, Flavour
-from .interface import VARIABLES, WARNINGS
+from .interface import WARNINGS
 from .variable import Variable
 
 FOLDER = Path(__file__).parent / "documentation"
@@ -28,18 +28,22 @@ CHECKED: Mapping[str, str] = {
 
 def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
     """Path inside the documentation -> the whole page, for one of the hovercraft's FMUs."""
+    ordinary = flavour.variant_of or flavour
     values = {
         "native": bool(flavour.parts),
         "flavour": flavour,
+        "ordinary": ordinary,
+        "exchange": bool(flavour.exchange),
         "fmi": flavour.fmi,
         "types": FMI_3_TYPES if flavour.fmi == 3 else {},
-        "description": flavour.model.description,
-        "variables": VARIABLES,
+        "description": ordinary.model.description,
+        "variables": flavour.model.variables,
         "warnings": WARNINGS,
         "integrators": INTEGRATORS,
         "presets": PRESETS,
         "drag_areas": DRAG_AREAS,
-        "checked": _checked(FOLDER / CHECKED[flavour.identifier]),
+        "checked": _checked(FOLDER / CHECKED[ordinary.identifier]),
+        "own": flavour.model.listed(flavour.own_starts),
     }
     return rendered(FOLDER, values)
 

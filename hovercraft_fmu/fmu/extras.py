@@ -74,9 +74,13 @@ def terminals_and_icons(model: Model) -> Element:
     return root
 
 
-def reference_result(identifier: str) -> dict[str, bytes]:
-    """What the default experiment gives, with the manifest of FMI-LS-REF 1.0.0-alpha.1: path -> content."""
-    file = f"{identifier}_out.csv"
+def reference_result(flavour: Flavour) -> dict[str, bytes]:
+    """What the default experiment gives, with the manifest of FMI-LS-REF 1.0.0-alpha.1: path -> content. None of a
+    variant, which gives something else.
+    """
+    if flavour.variant_of:
+        return {}
+    file = f"{flavour.identifier}_out.csv"
     root = Element(
         "fmiReferences",
         {

@@ -17,6 +17,7 @@ from importlib import metadata, resources
 from pathlib import Path
 
 from .archive import digest, write_archive
+from .block import Block, block
 from .description import NATIVE, NATIVE3, Flavour, model_description, xml
 from .native_header import variables_header
 
@@ -148,7 +149,7 @@ def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
     unit = UNIT.format(fmi=flavour.fmi, identifier=flavour.identifier, includes=includes)
     return {
         **{file.name: file.read_bytes() for file in files},
-        "variables.h": _header(build),
+        "variables.h": variables_header(block_of(flavour, build)).encode(),
         flavour.unit: unit.encode(),
     }
 
@@ -158,8 +159,9 @@ def headers(flavour: Flavour) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in sorted((C_FOLDER / f"fmi{flavour.fmi}").glob("*.h"))}
 
 
-def _header(build: str) -> bytes:
-    return variables_header(build).encode()
+def block_of(flavour: Flavour, build: str) -> Block:
+    """What its library says of itself; a variant says whose code it has."""
+    return block(flavour.model, build, identity(flavour.variant_of) if flavour.variant_of else build)
 
 
 def identity(flavour: Flavour) -> str:

@@ -8,7 +8,7 @@ from dataclasses import fields
 from ..model.craft import DERIVED, NOT_NEGATIVE, POSITIVE, Craft
 from ..model.dynamics import Controls, State
 from ..model.integrators import INTEGRATORS
-from .description import guid
+from .block import MARK, Block
 from .interface import (
     ACTION,
     BY_NAME,
@@ -39,12 +39,13 @@ HEADER = """\
 #define HOVERCRAFT_VARIABLES_H
 
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "kernel.h"
 
-#define BUILD "{build}"
-#define GUID "{guid}"
+#define CODE "{code}" /* a digest of code, table, compiler and options */
 
 /* Value references; `reals` and `integers` of an instance are indexed by them. */
 enum {{
@@ -77,7 +78,16 @@ struct variable {{
     enum rule rule;         /* of its value, beyond being finite */
     unsigned settable;      /* bit n: in phase n */
     bool start_given;       /* it is kept as the host set it */
-    double start;
+}};
+
+struct variant {{
+    char mark[16];          /* by which it is found in a library */
+    uint64_t size;          /* bytes */
+    char code[40];          /* that it belongs to */
+    char build[40];         /* what a saved state must be of */
+    char guid[40];
+    double starts[VARIABLE_COUNT];
+    uint64_t checksum;
 }};
 
 struct method {{
@@ -106,6 +116,13 @@ struct derived_value {{
 static const char *const PHASE_NAMES[] = {{{phase_names}}};
 static const struct variable VARIABLES[] = {{
 {variables}
+}};
+static const struct variant VARIANT = {{
+    "{mark}", {size}, "{code}", "{build}", "{guid}",
+    {{
+{starts}
+    }},
+    UINT64_C({checksum:#x})
 }};
 static const struct method METHODS[] = {{
 {methods}
@@ -157,8 +174,8 @@ OF_A_KIND = {
 RULES = ("ANY", "POSITIVE", "NOT_NEGATIVE", *OF_A_KIND.values())
 
 
-def variables_header(build: str) -> str:
-    """The text of variables.h for the FMU whose content has the hexadecimal digest `build`."""
+def variables_header(block: Block) -> str:
+    """The text of variables.h for the FMU whose block of start values that is."""
     warnings = {
         "INPUT_HELD": INPUT_HELD,
         "COUNTER_STOPPED": COUNTER_STOPPED,
@@ -178,8 +195,15 @@ def variables_header(build: str) -> str:
     }
     rows = (*MOTION, *DERIVATIVES[len(STATES) // 2 :], "projected_area")
     return HEADER.format(
-        build=build,
-        guid=guid(build),
+        mark=MARK.decode(),
+        code=block.code,
+        build=block.build,
+        guid=block.guid,
+        size=block.size,
+        checksum=block.checksum,
+        starts="\n".join(
+            f"        [{constant(v.name)}] = {block.starts[v.reference]!r}," for v in VARIABLES if v.start is not None
+        ),
         references="\n".join(f"    {constant(v.name)} = {v.reference}," for v in VARIABLES),
         time=TIME.reference,
         counts=_assigned(counts),
@@ -256,9 +280,8 @@ def _row(variable: Variable) -> str:
     phases = sum(1 << i for i, each in enumerate(settable) if each)
     role = _quoted(f"{variable.variability} {variable.causality}")
     given = "true" if variable.start is not None else "false"
-    start = _number(float(variable.start or 0.0))
     kind = variable.kind.upper()
-    return f"{{{_quoted(variable.name)}, {role}, {kind}, {_rule(variable.name)}, {phases}u, {given}, {start}}}"
+    return f"{{{_quoted(variable.name)}, {role}, {kind}, {_rule(variable.name)}, {phases}u, {given}}}"
 
 
 def _rule(name: str) -> str:

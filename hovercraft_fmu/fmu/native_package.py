@@ -5,12 +5,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from .archive import write_archive, zipped
+from .block import patched
 from .description import NATIVE, Flavour, model_description, xml
 from .document import documents, licenses
 from .extras import build_description, reference_result, terminals_and_icons
 from .icon import icon_png
 from .mach_o import universal
-from .machine_code import C_FOLDER, OPTIONS, PLATFORMS, identity, library, sources
+from .machine_code import C_FOLDER, OPTIONS, PLATFORMS, block_of, identity, library, sources
 
 FMI_2_FOLDERS = {"x86_64-linux": "linux64", "x86_64-windows": "win64", "x86_64-darwin": "darwin64"}
 
@@ -21,8 +22,8 @@ def build_native_fmu(
     """Write the native FMU of a flavour to `path` (its folder is made) and return the path.
 
     Args:
-        path: the file; without it build/HovercraftNative.fmu or build/HovercraftNative3.fmu.
-        flavour: NATIVE or NATIVE3: FMI 2.0 or FMI 3.0.
+        path: the file; without it the identifier of the flavour as a name, in build/.
+        flavour: NATIVE or NATIVE3, FMI 2.0 or FMI 3.0, or a variant of one.
         platforms: keys of PLATFORMS that it is to run on.
 
     Raises:
@@ -37,7 +38,7 @@ def _archive(flavour: Flavour, platforms: Iterable[str]) -> bytes:
     pages = {**documents(flavour), **licenses("Sine, cosine and logarithm are fdlibm's", "fdlibm.txt", _sun_notice())}
     files = {
         **{f"documentation/{name}": content for name, content in pages.items()},
-        **reference_result(flavour.identifier),
+        **reference_result(flavour),
         "sources/buildDescription.xml": xml(build_description(flavour, OPTIONS)),
     }
     if flavour.fmi == 2:
@@ -64,8 +65,11 @@ def _sun_notice() -> bytes:
 
 
 def _binaries(flavour: Flavour, platforms: Iterable[str]) -> dict[str, bytes]:
-    code = library(flavour)
+    code = library(flavour.variant_of or flavour)
     built = {platform: code.path(platform).read_bytes() for platform in platforms}
+    if flavour.variant_of:
+        own = block_of(flavour, identity(flavour))
+        built = {each: patched(content, own, Path(binary(each, flavour)).name) for each, content in built.items()}
     files = {binary(platform, flavour): content for platform, content in built.items()}
     if flavour.fmi == 2 and "x86_64-darwin" in built:
         files[binary("x86_64-darwin", flavour)] = universal([built["x86_64-darwin"], built["aarch64-darwin"]])

@@ -38,7 +38,7 @@ from {package}.{module} import {slave}
 class {model}({slave}):
     """The slave of this very build."""
 
-    build = "{build}"
+    build = "{build}"{own}
 
     # pythonfmu's wrapper needs a class with a method of its own
     def __init__(self, **kwargs: Any) -> None:
@@ -63,24 +63,30 @@ class Content:
     """Files of extra/, by path in the FMU."""
 
 
-HOVERCRAFT_CONTENT = Content(
-    PYTHON,
-    "fmu.python.slave",
-    "HovercraftSlave",
-    ("fmu/python/slave.py",),
-    lambda: documents(PYTHON),
-    lambda: reference_result(PYTHON.identifier),
-)
+def hovercraft_content(flavour: Flavour) -> Content:
+    """Of PYTHON, or of a variant of it."""
+    return Content(
+        flavour,
+        "fmu.python.slave",
+        "HovercraftSlave",
+        ("fmu/python/slave.py",),
+        lambda: documents(flavour),
+        lambda: reference_result(flavour),
+    )
 
 
-def build_fmu(path: str | os.PathLike[str] = f"build/{PYTHON.identifier}.fmu") -> Path:
+def build_fmu(path: str | os.PathLike[str] | None = None, flavour: Flavour = PYTHON) -> Path:
     """Write the FMU to `path` (its folder is made) and return the path.
+
+    Args:
+        path: the file; without it build/Hovercraft.fmu, or that name of a variant.
+        flavour: PYTHON, or a variant of it.
 
     Raises:
         ValueError: the name does not end in .fmu.
         OSError: the file cannot be written; one that stood there before still does.
     """
-    return write_python_fmu(path, HOVERCRAFT_CONTENT)
+    return write_python_fmu(path or f"build/{flavour.identifier}.fmu", hovercraft_content(flavour))
 
 
 def write_python_fmu(path: str | os.PathLike[str], content: Content) -> Path:
@@ -93,9 +99,8 @@ def _archive(content: Content) -> bytes:
     build = python_identity(content)
     # each module gets a name of its own, pythonfmu's, too: a host may have imported other ones of these names
     package = f"{flavour.identifier.lower()}_{build[:16]}"
-    entry = ENTRY_SCRIPT.format(
-        package=package, module=content.module, slave=content.slave, model=flavour.identifier, build=build
-    )
+    names = {"package": package, "module": content.module, "slave": content.slave, "model": flavour.identifier}
+    entry = ENTRY_SCRIPT.format(**names, build=build, own=_own(content))
     parts = f"The binaries and the modules in resources/{package}/pythonfmu are PythonFMU's"
     documentation = {**content.documents(), **licenses(parts, "pythonfmu.txt", _pythonfmu_license())}
     return zipped(
@@ -111,6 +116,14 @@ def _archive(content: Content) -> bytes:
             **{f"documentation/{name}": text for name, text in documentation.items()},
         }
     )
+
+
+def _own(content: Content) -> str:
+    """The line of a variant that says what it has of its own."""
+    flavour = content.flavour
+    if flavour.variant_of is None:
+        return ""
+    return f"\n    model = {content.slave}.model.variant({flavour.model.name!r}, {flavour.own_starts!r})"
 
 
 def python_identity(content: Content) -> str:

@@ -1,7 +1,7 @@
 """What a table of variables is made of: units, enumerations, rows, when a row may be set; and what follows from it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from types import MappingProxyType
@@ -101,6 +101,12 @@ class Variable:
             return None
         return "calculated" if self.start is None else "exact"
 
+    def shown(self, value: float | int) -> str:
+        """A value of it in words: an item of an enumeration by name, a real with its unit."""
+        if self.enumeration:
+            return self.enumeration.items[int(value) - 1][0]
+        return f"{value!r} {self.unit}" if self.unit not in (None, "1") else repr(value)
+
 
 class Phase(Enum):
     """Where the instance is in FMI's life cycle, in the words of the standard."""
@@ -129,6 +135,17 @@ class Model:
     """s, of the default experiment"""
     communication_step: float
     """s, of the default experiment"""
+
+    def variant(self, name: str, starts: Mapping[str, float | int]) -> "Model":
+        """The same with another name, and start values of its own."""
+        variables = tuple(replace(each, start=starts.get(each.name, each.start)) for each in self.variables)
+        starts = {each.name: starts[each.name] for each in self.variables if each.name in starts}
+        own = f"; with start values of its own: {self.listed(starts)}" if starts else ""
+        return replace(self, name=name, description=self.description + own, variables=variables)
+
+    def listed(self, values: Mapping[str, float | int]) -> str:
+        """Values of variables in words: 'integrator = rk4, step_size = 0.1 s'."""
+        return ", ".join(f"{name} = {self.by_name[name].shown(value)}" for name, value in values.items())
 
     @cached_property
     def by_reference(self) -> Mapping[int, Variable]:

@@ -1,9 +1,10 @@
 """Plans a scene, or inputs of your own, and runs it: on an FMU, or on the bare model; one kind of result."""
 
+from ..fmu.start_values import Value, start_value
 from .bare_run import run_model
 from .control_log import read_inputs
 from .fmu_run import Stepper, run_fmu, simulate, stepping
-from .planning import Inputs, Progress, Run, Value, method_in_words, plan, start_value
+from .planning import Inputs, Progress, Run, method_in_words, plan
 from .points import communication_points, controls_at, schedule
 from .result import Result, path_length, write_csv
 

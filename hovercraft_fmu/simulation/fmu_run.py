@@ -10,9 +10,10 @@ import numpy as np
 
 from ..building import default_fmu
 from ..fmu.interface import HOVERCRAFT, INPUTS
+from ..fmu.start_values import Value
 from ..host import Fmu, Instance, SimulationError
 from ..model.dynamics import Controls
-from .planning import Inputs, Progress, Run, Value, plan
+from .planning import Inputs, Progress, Run, plan
 from .result import Result
 
 

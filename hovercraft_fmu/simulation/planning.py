@@ -10,7 +10,8 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 
 from ..fmu.interface import BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
-from ..fmu.variable import Enumeration
+from ..fmu.start_values import Value
+from ..fmu.start_values import start_values as numbers
 from ..model.craft import Craft, preset
 from ..model.dynamics import State
 from ..model.integrators import integrator
@@ -18,8 +19,6 @@ from ..model.subcycling import Settings
 from ..scenes import Scene, Signals, scene, signals
 from .control_log import checked_signals, read_inputs
 
-Value: TypeAlias = float | int | str
-"""Of a variable; an item of an enumeration may be given by its name."""
 Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
 """A scene or its name; a CSV file (a name that ends in .csv); a structured array with `time` and input names."""
 Progress: TypeAlias = Callable[[float], None]
@@ -100,7 +99,7 @@ def plan(
     """
     chosen = _scene(scene_or_inputs)
     table = chosen.signals if chosen else _signals(cast("str | os.PathLike[str] | Signals", scene_or_inputs))
-    values = _scene_values(chosen, preset) | _start_values(start_values or {})
+    values = _scene_values(chosen, preset) | numbers(start_values or {})
     first, last = float(table["time"][0]), float(table["time"][-1])
     if len(table) == 1:
         last = first + HOVERCRAFT.stop_time
@@ -154,48 +153,6 @@ def _scene_values(chosen: Scene | None, preset_name: str | None) -> dict[str, fl
         values |= chosen.parameters
         values |= dict(zip(STATES, chosen.start, strict=True))
     return {name: value for name, value in values.items() if value != BY_NAME[name].start}
-
-
-def _start_values(given: Mapping[str, Value]) -> dict[str, float | int]:
-    values = {name: start_value(name, value) for name, value in given.items()}
-    for name, beside in HOVERCRAFT.choices.items():  # from here on the Enumeration alone says it
-        if beside.name in values:
-            number = int(values.pop(beside.name))
-            HOVERCRAFT.check_choice(name, number)
-            values[name] = HOVERCRAFT.chosen(name, int(values.get(name, BY_NAME[name].start or 0)), number)
-    return values
-
-
-def start_value(name: str, value: Value) -> float | int:
-    """The value as a number of the variable's type; an item of an enumeration may be given by name.
-
-    Raises:
-        ValueError: no such variable, one that cannot be set, not a number, or no whole one where it must be.
-    """
-    variable = BY_NAME.get(name)
-    if variable is None or variable.start is None:
-        settable = ", ".join(each.name for each in BY_NAME.values() if each.start is not None)
-        raise ValueError(f"{name} = {value}: must be a variable that can be set: {settable}")
-    if variable.enumeration and isinstance(value, str) and not value.isdigit():
-        return _item(name, value, variable.enumeration)
-    try:
-        number = float(value)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} = {value!r}: must be a number") from error
-    if isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} = {value!r}: must be a number")
-    if variable.kind == "Real":
-        return number
-    if not number.is_integer():
-        raise ValueError(f"{name} = {value!r}: must be a whole number" + (" or a name" if variable.enumeration else ""))
-    return int(number)
-
-
-def _item(name: str, value: str, enumeration: Enumeration) -> int:
-    number = enumeration.number(value)
-    if number is None:
-        raise ValueError(f"{name} = {value!r}: must be one of {', '.join(item for item, _ in enumeration.items)}")
-    return number
 
 
 def _check_times(run: Run) -> None:

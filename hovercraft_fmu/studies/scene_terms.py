@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import polars as pl
 
+from ..fmu.start_values import Value
 from ..model.craft import DIRECTIONAL
 from ..model.dynamics import State
 from ..model.subcycling import advance
 from ..scenes import SCENES, Scene
-from ..simulation import Value, plan, schedule
+from ..simulation import plan, schedule
 from ..view.palette import INK, SHADES
 from ..view.plots import new_figure
 from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread

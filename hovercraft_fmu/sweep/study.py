@@ -15,11 +15,12 @@ from scipy import stats
 from scipy.stats import qmc
 
 from ..fmu.interface import BY_NAME, INPUTS
+from ..fmu.start_values import start_value
 from ..model.craft import Craft, check_parameter
 from ..model.integrators import integrator
 from ..model.subcycling import check_step_size, check_tolerance
 from ..scenes import Signals
-from ..simulation import Run, plan, read_inputs, start_value
+from ..simulation import Run, plan, read_inputs
 from .quantities import DERIVED, OBSERVED, Event, Keep
 
 if sys.version_info >= (3, 11):

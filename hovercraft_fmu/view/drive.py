@@ -12,9 +12,10 @@ from time import perf_counter
 from typing import Protocol
 
 from ..fmu.interface import INPUTS, STATES
+from ..fmu.start_values import Value
 from ..model.dynamics import Controls, State
 from ..scenes import signals
-from ..simulation import Run, Stepper, Value, plan, stepping
+from ..simulation import Run, Stepper, plan, stepping
 from .operator import PRESET, TIME_SCALE, Action, Operator, Pace
 from .window import Shown, Window, pygame
 

@@ -23,7 +23,7 @@ static long resident(void)
 static int cycle(enum call_use use)
 {
     static char bytes[MOST_BYTES];
-    void *state = NULL, *restored = NULL, *craft = call_instantiate(use, GUID, "");
+    void *state = NULL, *restored = NULL, *craft = call_instantiate(use, VARIANT.guid, "");
     size_t size = 0;
     int good = craft && call_start(craft) == CALL_OK &&
                (use == CALL_EXCHANGE ? call_set_time(craft, 0.0) : call_step(craft, 0.0, 0.001)) == CALL_OK &&

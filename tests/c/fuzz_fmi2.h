@@ -16,7 +16,7 @@ static void *made(struct bytes *bytes)
     guid[sizeof guid - 1] = '\0';
     const fmi2Type type = how & 64 ? fmi2ModelExchange : how == 15 ? (fmi2Type)2 : fmi2CoSimulation;
     return fmi2Instantiate(how & 1 ? "craft" : NULL, type,
-                           how % 32 == 30 ? guid : how % 32 == 28 ? NULL : GUID, NULL,
+                           how % 32 == 30 ? guid : how % 32 == 28 ? NULL : VARIANT.guid, NULL,
                            how & 2 ? &callbacks : NULL, fmi2False, how & 4 ? fmi2True : fmi2False);
 }
 

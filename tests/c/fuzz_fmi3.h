@@ -6,7 +6,7 @@ static void *made(struct bytes *bytes)
     const unsigned how = a_byte(bytes);
     const fmi3LogMessageCallback log = how & 2 ? call_log : NULL;
     const bool logging = how & 4;
-    const char *name = how & 1 ? "craft" : NULL, *token = GUID;
+    const char *name = how & 1 ? "craft" : NULL, *token = VARIANT.guid;
     char any[16];
     take(bytes, any, sizeof any - 1);
     any[sizeof any - 1] = '\0';

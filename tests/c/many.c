@@ -30,7 +30,7 @@ static void *made(int kind)
 {
     static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER};
     const double controls[] = {kind % 11, kind % 7 / 7.0, kind % 5 / 5.0};
-    void *craft = call_instantiate(exchanges(kind) ? CALL_EXCHANGE : CALL_STEPS, GUID, "");
+    void *craft = call_instantiate(exchanges(kind) ? CALL_EXCHANGE : CALL_STEPS, VARIANT.guid, "");
     demand(craft != NULL, "instantiate");
     demand(call_choose(craft, V_INTEGRATOR, kind % 4 + 1) == CALL_OK, "choose");
     demand(call_start(craft) == CALL_OK, "initialization");

@@ -10,7 +10,7 @@ double NAME(void)
 {
     static const unsigned mass = V_MASS;
     double value = -1.0;
-    void *craft = call_instantiate(CALL_STEPS, GUID, "");
+    void *craft = call_instantiate(CALL_STEPS, VARIANT.guid, "");
     if (craft && call_start(craft) == CALL_OK)
         call_get(craft, &mass, 1, &value);
     if (craft)

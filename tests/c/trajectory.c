@@ -90,7 +90,7 @@ static unsigned long long hash_of_run(const struct run *run)
     enum { OUTPUTS = sizeof outputs / sizeof *outputs };
     double values[OUTPUTS];
     unsigned long long hash = 0xcbf29ce484222325ULL;
-    void *craft = call_instantiate(CALL_STEPS, GUID, "");
+    void *craft = call_instantiate(CALL_STEPS, VARIANT.guid, "");
     if (!craft || call_set(craft, run->references, run->starts, run->values) != CALL_OK ||
         call_choose(craft, V_INTEGRATOR, run->method) != CALL_OK || call_start(craft) != CALL_OK)
         return 0;

@@ -8,6 +8,7 @@
 #include "fmi2Functions.h"
 #include "instance.h"
 #include "memory.h"
+#include "variant.h"
 
 #ifdef __GNUC__
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard's functions have some that a craft does not need */
@@ -71,9 +72,9 @@ static bool is_acceptable(struct instance *instance, fmi2Type type, fmi2String g
     if (type != fmi2CoSimulation && type != fmi2ModelExchange)
         instance_say(instance, REFUSED, "fmuType = %i: must be fmi2ModelExchange, %i, or fmi2CoSimulation, %i",
                      (long long)type, (long long)fmi2ModelExchange, (long long)fmi2CoSimulation);
-    else if (!guid || strcmp(guid, GUID) != 0)
+    else if (!guid || strcmp(guid, variant()->guid) != 0)
         instance_say(instance, REFUSED, "fmuGUID = '%q': must be '%s', as in modelDescription.xml",
-                     guid ? guid : "NULL", GUID);
+                     guid ? guid : "NULL", variant()->guid);
     else
         return true;
     return false;
@@ -91,8 +92,9 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     memcpy(c->name, name ? name : "", length);
     c->name[length] = '\0';
     const struct services services = {2, tell, allocate, release, c};
-    instance_start(&c->instance, type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION, &services, logging != 0);
-    if (is_acceptable(&c->instance, type, guid))
+    const enum use use = type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION;
+    if (instance_start(&c->instance, use, &services, logging != 0) != REFUSED &&
+        is_acceptable(&c->instance, type, guid))
         return c;
     memory_release(c);
     return NULL;

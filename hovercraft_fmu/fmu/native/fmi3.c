@@ -8,6 +8,7 @@
 #include "fmi3Functions.h"
 #include "instance.h"
 #include "memory.h"
+#include "variant.h"
 
 #ifdef __GNUC__
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard's functions have some that a craft does not need */
@@ -63,7 +64,16 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const f
     return STATUS_OF(SET_DEBUG_LOGGING, n == 0 || categories, instance_log(c, on, n, categories));
 }
 
-/* NULL where there is no memory, or where the token is not this FMU's. */
+static bool is_acceptable(struct instance *instance, fmi3String token)
+{
+    if (token && strcmp(token, variant()->guid) == 0)
+        return true;
+    instance_say(instance, REFUSED, "instantiationToken = '%q': must be '%s', as in modelDescription.xml",
+                 token ? token : "NULL", variant()->guid);
+    return false;
+}
+
+/* NULL where there is no memory, or where start values or the token are not this FMU's. */
 static struct component *made(enum use use, fmi3String token, bool logging, fmi3InstanceEnvironment environment,
                               fmi3LogMessageCallback log)
 {
@@ -73,11 +83,8 @@ static struct component *made(enum use use, fmi3String token, bool logging, fmi3
     const struct services services = {3, tell, allocate, release, c};
     c->environment = environment;
     c->log = log;
-    instance_start(&c->instance, use, &services, logging);
-    if (token && strcmp(token, GUID) == 0)
+    if (instance_start(&c->instance, use, &services, logging) != REFUSED && is_acceptable(&c->instance, token))
         return c;
-    instance_say(&c->instance, REFUSED, "instantiationToken = '%q': must be '%s', as in modelDescription.xml",
-                 token ? token : "NULL", GUID);
     memory_release(c);
     return NULL;
 }

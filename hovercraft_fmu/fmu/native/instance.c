@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "variant.h"
+
 bool instance_has_started(const struct content *content)
 {
     return content->phase != INSTANTIATED && content->phase != INITIALIZING;
@@ -20,22 +22,24 @@ enum verdict instance_reset(struct instance *instance)
     instance->now = empty;
     instance->last_step = FINE;
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
+        if (!VARIABLES[i].start_given)
+            continue;
         if (VARIABLES[i].kind == REAL)
-            instance->now.reals[i] = VARIABLES[i].start;
+            instance->now.reals[i] = variant()->starts[i];
         else
-            instance->now.integers[i] = (int32_t)VARIABLES[i].start;
+            instance->now.integers[i] = (int32_t)variant()->starts[i];
     }
     return FINE;
 }
 
-void instance_start(struct instance *instance, enum use use, const struct services *services, bool logging)
+enum verdict instance_start(struct instance *instance, enum use use, const struct services *services, bool logging)
 {
-    instance->now.use = use;
+    instance->now = (struct content){.use = use, .phase = INSTANTIATED};
     instance->services = *services;
     instance->warnings = logging;
     instance->errors = true;
     instance->inside = false;
-    instance_reset(instance);
+    return variant_check(instance) == REFUSED ? REFUSED : instance_reset(instance);
 }
 
 static enum verdict check_tolerance(struct instance *instance, double tolerance)
@@ -101,7 +105,7 @@ static enum verdict choose(struct instance *instance, unsigned enumeration, int3
         i++;
     const unsigned beside = CHOICES[i].number;
     const int32_t said = integers[enumeration], number = integers[beside];
-    if (number != 0 && number != said && said != (int32_t)VARIABLES[enumeration].start)
+    if (number != 0 && number != said && said != (int32_t)variant()->starts[enumeration])
         return instance_say(instance, REFUSED, "%s = %i and %s = %i: must be the same where both are set",
                             VARIABLES[enumeration].name, (long long)said, VARIABLES[beside].name, (long long)number);
     *item = number != 0 ? number : said;

@@ -95,8 +95,10 @@ static inline void instance_come_back(struct instance *instance, bool inside)
         instance_enter(instance);
 }
 
-/* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. */
-DOOR void instance_start(struct instance *instance, enum use use, const struct services *services, bool logging);
+/* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. Refused: the library's
+   start values (variant.h) cannot be. */
+DOOR enum verdict instance_start(struct instance *instance, enum use use, const struct services *services,
+                                 bool logging);
 DOOR enum verdict instance_reset(struct instance *instance);
 
 /* What permits.c lets through (permits.h) is in the right phase and of the right use; no array is NULL. */
@@ -146,6 +148,8 @@ DOOR enum verdict instance_get_enumerations(struct instance *instance, const uns
                                             int64_t *values);
 DOOR enum verdict instance_set_enumerations(struct instance *instance, const unsigned *references, size_t n,
                                             const int64_t *values);
+/* Refused: a start value that a host could not set either. */
+DOOR enum verdict instance_check_start(struct instance *instance, unsigned reference, double value);
 /* A call for a type that has no variables: an empty list is fine. */
 DOOR enum verdict instance_none_of(struct instance *instance, const char *name, const char *kind,
                                    const unsigned *references, size_t n);

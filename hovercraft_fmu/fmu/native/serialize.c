@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "instance.h"
+#include "variant.h"
 
 enum { VERSION = 4, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
 static const char MAGIC[] = "HOVERFMU";
@@ -142,7 +143,7 @@ enum verdict instance_serialize(struct instance *instance, const struct content 
                             (unsigned long long)serialized_size());
     memcpy(bytes, MAGIC, MAGIC_SIZE);
     exchange_integer(&cursor, &version);
-    memcpy(bytes + cursor.at, BUILD, BUILD_SIZE);
+    memcpy(bytes + cursor.at, variant()->build, BUILD_SIZE);
     cursor.at = HEAD_SIZE;
     exchange(&cursor, &copy);
     uint64_t sum = checksum(bytes, cursor.at);
@@ -166,7 +167,7 @@ static bool is_of_this_build(const unsigned char *bytes, size_t size)
     int32_t version = 0;
     exchange_integer(&cursor, &version);
     return version == VERSION && size == serialized_size() &&
-           memcmp(bytes + cursor.at, BUILD, BUILD_SIZE) == 0;
+           memcmp(bytes + cursor.at, variant()->build, BUILD_SIZE) == 0;
 }
 
 static bool is_phase_of_use(const struct content *c)
@@ -200,7 +201,7 @@ static enum verdict deserialize(struct instance *instance, const unsigned char *
     memcpy(build, bytes + MAGIC_SIZE + 4, BUILD_SIZE);
     if (!is_of_this_build(bytes, size))
         return instance_say(instance, REFUSED, "FMU state of build %q: must be a state of this build, %s", build,
-                            BUILD);
+                            variant()->build);
     *content = instance->now; /* what is not among the bytes is worked out again */
     exchange(&cursor, content);
     content->reals[V_PROJECTED_AREA] = kernel_derived(&content->craft).projected_area;

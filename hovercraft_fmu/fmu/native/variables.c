@@ -220,6 +220,16 @@ static enum verdict check_integer(struct instance *instance, const struct variab
     return why ? instance_say(instance, REFUSED, "%s = %i: %s", variable->name, (long long)value, why) : FINE;
 }
 
+enum verdict instance_check_start(struct instance *instance, unsigned reference, double value)
+{
+    const struct variable *variable = &VARIABLES[reference];
+    if (variable->kind == REAL)
+        return check_real(instance, variable, value);
+    if (!(fabs(value) <= INT32_MAX) || value != (double)(int32_t)value)
+        return instance_say(instance, REFUSED, "%s = %r: must be a whole number", variable->name, value);
+    return check_integer(instance, variable, (int32_t)value);
+}
+
 enum verdict instance_set_integers(struct instance *instance, const unsigned *references, size_t n, const int *values)
 {
     for (size_t i = 0; i < n; i++) {

@@ -1,0 +1,61 @@
+#include "variant.h"
+
+#include <string.h>
+
+_Static_assert(sizeof VARIANT == 16 + 8 + 3 * 40 + 8 * VARIABLE_COUNT + 8, "no gaps: it is written as bytes");
+
+const struct variant *variant(void)
+{
+    const struct variant *volatile place = &VARIANT;
+    return place;
+}
+
+static uint64_t with_word(uint64_t sum, uint64_t word)
+{
+    for (unsigned i = 0; i < 8; i++)
+        sum = (sum ^ (word >> 8 * i & 0xff)) * UINT64_C(0x100000001b3);
+    return sum;
+}
+
+static uint64_t with_text(uint64_t sum, const char *text, size_t size)
+{
+    for (size_t i = 0; i < size; i++)
+        sum = (sum ^ (unsigned char)text[i]) * UINT64_C(0x100000001b3);
+    return sum;
+}
+
+/* FNV-1a of all before the checksum: no change of a single byte escapes it. */
+static uint64_t checksum_of(const struct variant *v)
+{
+    uint64_t sum = with_text(UINT64_C(0xcbf29ce484222325), v->mark, sizeof v->mark);
+    sum = with_word(sum, v->size);
+    sum = with_text(sum, v->code, sizeof v->code);
+    sum = with_text(sum, v->build, sizeof v->build);
+    sum = with_text(sum, v->guid, sizeof v->guid);
+    for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
+        uint64_t word;
+        memcpy(&word, &v->starts[i], sizeof word);
+        sum = with_word(sum, word);
+    }
+    return sum;
+}
+
+static bool is_whole_block(const struct variant *v)
+{
+    return v->size == sizeof *v && v->checksum == checksum_of(v) && !v->code[sizeof v->code - 1] &&
+           !v->build[sizeof v->build - 1] && !v->guid[sizeof v->guid - 1];
+}
+
+enum verdict variant_check(struct instance *instance)
+{
+    const struct variant *v = variant();
+    if (!is_whole_block(v))
+        return instance_say(instance, REFUSED, "start values in the library: must be complete and unchanged");
+    if (strcmp(v->code, CODE) != 0)
+        return instance_say(instance, REFUSED, "start values in the library of code %q: must be of its code, %s",
+                            v->code, CODE);
+    for (unsigned i = 0; i < VARIABLE_COUNT; i++)
+        if (VARIABLES[i].start_given && instance_check_start(instance, i, v->starts[i]) == REFUSED)
+            return REFUSED;
+    return FINE;
+}
