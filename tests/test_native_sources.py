@@ -147,7 +147,8 @@ def build_with_mass(folder: Path, flavour: Flavour, mass: float) -> Path:
 
 def test_two_builds_of_each_fmu_linked_into_one_program_answer_for_themselves(tmp_path: Path) -> None:
     """2.0, 2.1.1; 3.0, 2.4.10."""
-    objects, calls = [], []
+    objects: list[str] = []
+    calls: list[str] = []
     for i, (flavour, mass) in enumerate(BUILDS):
         place = build_with_mass(tmp_path, flavour, mass)
         command = [c_compiler(), "-O1", f"-DFMI{flavour.fmi}_FUNCTION_PREFIX=B{i}_", f"-DFMI={flavour.fmi}"]
@@ -238,7 +239,8 @@ def test_a_real_added_to_the_table_alone_does_not_compile(tmp_path: Path, monkey
 @pytest.fixture(scope="module")
 def roots(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
     """square_root as the machine has it, and the one in C."""
-    folder, made = tmp_path_factory.mktemp("root"), []
+    folder = tmp_path_factory.mktemp("root")
+    made: list[Any] = []
     for option in ("", "-DHOVERCRAFT_ROOT_IN_C"):
         command = [c_compiler(), "-O1", *filter(None, [option]), "-I", str(C_FOLDER), str(C_TESTS / "root_of.c")]
         run([*command, "-shared", "-fPIC", "-o", f"root{len(made)}.so"], folder)
