@@ -73,7 +73,7 @@ static bool is_acceptable(struct instance *instance, fmi2Type type, fmi2String g
         instance_say(instance, REFUSED, "fmuType = %i: must be fmi2ModelExchange, %i, or fmi2CoSimulation, %i",
                      (long long)type, (long long)fmi2ModelExchange, (long long)fmi2CoSimulation);
     else if (!guid || strcmp(guid, variant()->guid) != 0)
-        instance_say(instance, REFUSED, "fmuGUID = '%q': must be '%s', as in modelDescription.xml",
+        instance_say(instance, REFUSED, "fmuGUID = '%q': must be '%q', as in modelDescription.xml",
                      guid ? guid : "NULL", variant()->guid);
     else
         return true;

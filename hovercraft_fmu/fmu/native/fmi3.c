@@ -68,7 +68,7 @@ static bool is_acceptable(struct instance *instance, fmi3String token)
 {
     if (token && strcmp(token, variant()->guid) == 0)
         return true;
-    instance_say(instance, REFUSED, "instantiationToken = '%q': must be '%s', as in modelDescription.xml",
+    instance_say(instance, REFUSED, "instantiationToken = '%q': must be '%q', as in modelDescription.xml",
                  token ? token : "NULL", variant()->guid);
     return false;
 }

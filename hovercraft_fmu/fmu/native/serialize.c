@@ -200,7 +200,7 @@ static enum verdict deserialize(struct instance *instance, const unsigned char *
                             (unsigned long long)size);
     memcpy(build, bytes + MAGIC_SIZE + 4, BUILD_SIZE);
     if (!is_of_this_build(bytes, size))
-        return instance_say(instance, REFUSED, "FMU state of build %q: must be a state of this build, %s", build,
+        return instance_say(instance, REFUSED, "FMU state of build %q: must be a state of this build, %q", build,
                             variant()->build);
     *content = instance->now; /* what is not among the bytes is worked out again */
     exchange(&cursor, content);
