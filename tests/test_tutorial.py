@@ -3,6 +3,8 @@
 import html
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -49,3 +51,29 @@ def test_its_first_sections_run_with_fmi_3(number: int, native3_fmu: Path, fresh
     (tmp_path / "build").mkdir()
     shutil.copy(native3_fmu, tmp_path / "build" / native3_fmu.name)
     assert re.search(PRINTED[number], fresh(BLOCKS[number].replace("Hovercraft.fmu", native3_fmu.name)))
+
+
+TOOLS = pages(NATIVE)["tools.html"]
+IN_PYTHON = [html.unescape(text) for text in re.findall(r'<pre class="python">\n(.*?)</pre>', TOOLS, re.DOTALL)]
+
+
+@pytest.mark.once
+@pytest.mark.parametrize(("host", "printed"), [("libcosimpy", r"^300\.0 s$"), ("ecospy", r"^1[0-9]\.\d+$")])
+def test_what_is_said_to_have_run_in_a_tool_runs(
+    host: str, printed: str, native_fmu: Path, autopilot: Path, fresh: Fresh, tmp_path: Path
+) -> None:
+    if missing := HOSTS[host].missing():
+        pytest.skip(missing)
+    if host == "ecospy" and not Path(sys.prefix, "lib", "libtbb.so.12").exists():
+        pytest.skip("the package tbb is not in this environment's own folder")
+    shutil.copy(native_fmu, tmp_path)
+    build_ssp(tmp_path / "HovercraftNativeLoop.ssp", native_fmu, autopilot)
+    (code,) = [block for block in IN_PYTHON if host in block]
+    assert re.search(printed, fresh(code), re.MULTILINE)
+
+
+def test_the_command_of_fmpy_runs(native_fmu: Path, tmp_path: Path) -> None:
+    (command,) = re.findall(r'<pre class="command">\npython (.*)\n</pre>', TOOLS)
+    shutil.copy(native_fmu, tmp_path)
+    subprocess.run([sys.executable, *command.split()], cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "out.csv").read_text().startswith('"time"')
