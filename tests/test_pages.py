@@ -11,7 +11,7 @@ from PIL import Image
 from hovercraft_fmu.fmu.document import FOLDER
 from hovercraft_fmu.studies.pages import PICTURES, SHOWS, pages, shown
 
-SIZE_MAX, DOCUMENTS_MAX = 600_000, 15
+SIZE_MAX, DOCUMENTS_MAX = 600_000, 16
 
 
 class Links(HTMLParser):
