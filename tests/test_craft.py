@@ -3,7 +3,6 @@ import re
 from dataclasses import FrozenInstanceError, fields
 from functools import cached_property
 
-import numpy as np
 import pytest
 
 from hovercraft_fmu.model.craft import DERIVED, PRESETS, Craft, preset
@@ -51,13 +50,6 @@ def test_impossible_values_are_named(name: str, value: float, rule: str) -> None
     assert repr(value) in str(caught.value)
 
 
-def test_a_batch_is_checked_craft_by_craft() -> None:
-    with pytest.raises(ValueError, match=r"mass = -2\.0: must be greater than 0"):
-        Craft(mass=np.array([1.0, -2.0, 3.0]))  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="thrust_max"):
-        Craft(thrust_max=np.array([1.0, -2.0]))  # type: ignore[arg-type]
-
-
 THICK_AIR = {"height": 1.0, "air_density": 1e308, "drag_coefficient": 5.0}
 OUT_OF_RANGE: dict[str, dict[str, float]] = {
     "projected_area = inf m2": {"length": 1e200, "width": 1e200, "height": 1e200},
@@ -88,12 +80,6 @@ def test_every_derived_number_is_checked() -> None:
     assert numbers - {"plain_drag", "rubs"} == {name for name, _, _ in DERIVED}
     # a finite length times at most a half is finite
     assert {what.split()[0] for what in OUT_OF_RANGE} == {name for name, _, _ in DERIVED} - {"drag_center"}
-
-
-def test_derived_values_of_a_batch_are_checked_craft_by_craft() -> None:
-    heights = np.array([1.0, 1e200, 5.0])
-    with np.errstate(over="ignore"), pytest.raises(ValueError, match=r"^projected_area = inf m2: must be a finite"):
-        Craft(length=1e200, height=heights)  # type: ignore[arg-type]
 
 
 def test_frozen() -> None:

@@ -149,11 +149,6 @@ def test_adaptive_says_where_it_cannot_go_on() -> None:
         advance(State(vx=1e6), NONE, hard, 1.0, Settings(1e-3, method("adaptive"), 1e-14))
 
 
-def test_adaptive_takes_one_craft() -> None:
-    with pytest.raises(ValueError, match="must be another one for arrays of craft"):
-        advance(State(), NONE, Craft(), 1.0, Settings(0.1, method("adaptive")), np)
-
-
 @pytest.mark.parametrize("each", INTEGRATORS, ids=lambda each: each.name)
 def test_what_is_watched(each: Any) -> None:
     """Coasting slows down, so the largest number is that of the first sub-step; the spin is without drag."""

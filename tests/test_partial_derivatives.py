@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from hovercraft_fmu.fmu.interface import INPUTS, STATES
 from hovercraft_fmu.host import read_description
+from hovercraft_fmu.model import dynamics
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import (
     Controls,
@@ -69,15 +71,12 @@ def _clip(value: Any, low: Any, high: Any) -> Any:
     return analytic(low if x < least else high)
 
 
-COMPLEX = SimpleNamespace(
-    cos=np.cos,
-    sin=np.sin,
-    sqrt=np.sqrt,
-    log=np.log,
-    where=np.where,
-    clip=_clip,
-    fmax=lambda a, b: a if a.real > b else b,
-)
+COMPLEX: dict[str, Any] = {
+    "math": SimpleNamespace(cos=np.cos, sin=np.sin, sqrt=np.sqrt, log=np.log),
+    "_clip": _clip,
+    "max": lambda a, b: a if a.real > b else b,
+}
+"""What the model's functions take these numbers with."""
 STEP = 1e-200  # its square is 0
 
 
@@ -86,9 +85,10 @@ def _model(values: dict[str, Any], drag_area: int) -> dict[str, Any]:
     craft = object.__new__(Craft)  # complex numbers would not come through its door
     vars(craft).update({name: values[name] for name in PARAMETERS}, drag_area=drag_area)
     state, held = State(*(values[name] for name in STATES)), Controls(*(values[name] for name in INPUTS))
-    loads_at = (sliding_load_function if craft.rubs else load_function)(held, craft, ns=COMPLEX)
-    x, y, moment, _ = loads_at(*state[2:])
-    motion = (*body_velocity(state, COMPLEX), np.sqrt(state.vx * state.vx + state.vy * state.vy))
+    with patch.dict(vars(dynamics), COMPLEX):
+        loads_at = (sliding_load_function if craft.rubs else load_function)(held, craft)
+        x, y, moment, _ = loads_at(*state[2:])
+        motion = (*body_velocity(state), np.sqrt(state.vx * state.vx + state.vy * state.vy))
     accelerations = (x / craft.mass, y / craft.mass, moment / craft.inertia)
     found = (*state, *motion, *accelerations, craft.projected_area)
     return dict(zip((*UNKNOWNS, "projected_area"), found, strict=True))

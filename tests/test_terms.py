@@ -49,10 +49,10 @@ def test_the_general_equations_have_the_bits_of_the_special_ones(craft: Craft, s
     """There is one set of equations; what is left out of it costs nothing and changes no bit."""
     craft = replace(craft, drag_area=1, rotational_drag=0.0, skirt_friction=0.0)
     factors, motion = (0.001 / craft.mass, 0.001 / craft.inertia), state[2:]
-    plain = _with_plain_drag(asked, craft, *factors, math)(*motion)
-    assert _with_any_drag(asked, craft, *factors, math)(*motion) == plain
+    plain = _with_plain_drag(asked, craft, *factors)(*motion)
+    assert _with_any_drag(asked, craft, *factors)(*motion) == plain
     still = replace(craft, drag_coefficient=0.0)
-    assert _without_drag(asked, still, *factors)(*motion) == _with_plain_drag(asked, still, *factors, math)(*motion)
+    assert _without_drag(asked, still, *factors)(*motion) == _with_plain_drag(asked, still, *factors)(*motion)
 
 
 # ---- wind

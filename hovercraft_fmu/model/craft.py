@@ -1,11 +1,10 @@
 """The craft: its constants, checked once at the door."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from types import MappingProxyType
-from typing import cast
 
 POSITIVE = ("mass", "inertia", "length", "width", "height")
 NOT_NEGATIVE = ("drag_coefficient", "air_density", "steering_force", "skirt_friction", "gravity")
@@ -35,7 +34,7 @@ DERIVED = (
 
 @dataclass(frozen=True)
 class Craft:
-    """The constants of one hovercraft; a batch of craft has numpy arrays in the fields that differ.
+    """The constants of one hovercraft.
 
     Raises:
         ValueError: names the parameter, or the derived value that is not a finite number, the value and the rule.
@@ -76,23 +75,18 @@ class Craft:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            for value in _items(getattr(self, field.name)):
-                check_parameter(field.name, value)
-        # minus, not <=: arrays of craft pass through here too
-        for room in _items(self.thrust_max - self.thrust_min):
-            if room < 0.0:
-                raise ValueError(
-                    f"thrust_min = {self.thrust_min!r} N: must not be above thrust_max = {self.thrust_max!r} N"
-                )
+            check_parameter(field.name, getattr(self, field.name))
+        if self.thrust_min > self.thrust_max:
+            raise ValueError(
+                f"thrust_min = {self.thrust_min!r} N: must not be above thrust_max = {self.thrust_max!r} N"
+            )
         self._check_derived()
 
     def _check_derived(self) -> None:
         for name, unit, parts in DERIVED:
-            derived = getattr(self, name)
-            for value in (derived,) if isinstance(derived, float) else _items(derived):
-                if not math.isfinite(value):
-                    rule = f"must be a finite number; it is made of {parts}"
-                    raise ValueError(f"{name} = {float(value)!r} {unit}: {rule}")
+            value = getattr(self, name)
+            if not math.isfinite(value):
+                raise ValueError(f"{name} = {value!r} {unit}: must be a finite number; it is made of {parts}")
 
     @cached_property
     def projected_area(self) -> float:
@@ -135,12 +129,12 @@ class Craft:
     @cached_property
     def plain_drag(self) -> bool:
         """Whether drag is the default's: of constant area, and with no moment of its own."""
-        return not (any_of(self.drag_area - CONSTANT) or any_of(self.rotational_drag))
+        return self.drag_area == CONSTANT and self.rotational_drag == 0.0
 
     @cached_property
     def rubs(self) -> bool:
         """Whether skirt and ground rub."""
-        return any_of(self.skirt_friction)
+        return self.skirt_friction != 0.0
 
     @cached_property
     def drag_rate(self) -> float:
@@ -161,17 +155,6 @@ class Craft:
     def thruster_moment(self) -> float:
         """N.m: yaw moment of the port bow thruster, full on; its lever arm is half the length."""
         return 0.5 * self.length * self.steering_force
-
-
-def _items(value: float) -> Iterable[float]:
-    """One number, or all of an array of numbers (no numpy here: the FMU's host may not have it)."""
-    return cast(Iterable[float], getattr(value, "flat", (value,)))
-
-
-def any_of(value: float) -> bool:
-    """Whether the number, or any of an array of numbers, is not zero."""
-    of_array = getattr(value, "any", None)
-    return bool(of_array() if of_array else value)
 
 
 def check_parameter(name: str, value: float) -> None:

@@ -1,17 +1,13 @@
-"""State, controls, loads, derivatives, energy: pure functions.
+"""State, controls, loads, derivatives, energy: pure functions of plain floats.
 
-Every function takes plain floats, or numpy arrays for a batch of craft; `ns` is where sine, cosine and square root
-come from: `math` or `numpy`. The order of operations decides the last bits and is the same in every language.
+The order of operations decides the last bits and is the same in every language.
 """
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias, cast
+from typing import NamedTuple, TypeAlias
 
-from .craft import DIRECTIONAL, Craft, any_of
-
-Namespace: TypeAlias = Any
-"""`math` for floats; for arrays `numpy`, or a module with its sin, cos, sqrt and clip."""
+from .craft import DIRECTIONAL, Craft
 
 
 class State(NamedTuple):
@@ -80,37 +76,33 @@ Friction: TypeAlias = Callable[[float, float, float], tuple[float, float, float]
 """(vx, vy, yaw rate) as they would be without friction -> with it."""
 
 
-def saturate(controls: Controls, craft: Craft, ns: Namespace = math) -> Controls:
+def saturate(controls: Controls, craft: Craft) -> Controls:
     """The controls held inside their limits: thrust in the craft's, thruster commands from 0 to 1."""
-    clip = _clip if ns is math else ns.clip
     return Controls(
-        clip(controls.thrust, craft.thrust_min, craft.thrust_max),
-        clip(controls.port, 0.0, 1.0),
-        clip(controls.starboard, 0.0, 1.0),
+        _clip(controls.thrust, craft.thrust_min, craft.thrust_max),
+        _clip(controls.port, 0.0, 1.0),
+        _clip(controls.starboard, 0.0, 1.0),
         controls.wind_x,
         controls.wind_y,
     )
 
 
 def _clip(value: float, low: float, high: float) -> float:
-    """numpy.clip for one float."""
     return low if value < low else high if value > high else value
 
 
-def actuation(controls: Controls, craft: Craft, ns: Namespace = math) -> tuple[float, float, float]:
+def actuation(controls: Controls, craft: Craft) -> tuple[float, float, float]:
     """Thrust [N], side force of both bow thrusters [N, to starboard] and their moment [N.m], after saturation."""
-    thrust, port, starboard, _, _ = saturate(controls, craft, ns)
+    thrust, port, starboard, _, _ = saturate(controls, craft)
     return thrust, craft.steering_force * (port - starboard), craft.thruster_moment * (port - starboard)
 
 
 def windy(controls: Controls) -> bool:
-    """Whether the air moves, for any of the craft."""
-    return any_of(controls.wind_x) or any_of(controls.wind_y)
+    """Whether the air moves."""
+    return controls.wind_x != 0.0 or controls.wind_y != 0.0
 
 
-def load_function(
-    controls: Controls, craft: Craft, per_mass: float = 1.0, per_inertia: float = 1.0, ns: Namespace = math
-) -> LoadFunction:
+def load_function(controls: Controls, craft: Craft, per_mass: float = 1.0, per_inertia: float = 1.0) -> LoadFunction:
     """The loads on the craft, but for the friction of its skirt, as a function of its motion alone.
 
     Forces are times `per_mass`, moments times `per_inertia`: 1/m and 1/I for the accelerations; h/m and h/I for what
@@ -121,28 +113,24 @@ def load_function(
     What the scene does not ask for costs nothing: the default's drag, and none at all, have functions of their own,
     with the bits of the general one.
     """
-    if ns is math and craft.drag_factor == 0.0:
+    if craft.drag_factor == 0.0:
         return _without_drag(controls, craft, per_mass, per_inertia)
     if craft.plain_drag and not windy(controls):
-        return _with_plain_drag(controls, craft, per_mass, per_inertia, ns)
-    return _with_any_drag(controls, craft, per_mass, per_inertia, ns)
+        return _with_plain_drag(controls, craft, per_mass, per_inertia)
+    return _with_any_drag(controls, craft, per_mass, per_inertia)
 
 
-def _pushes(
-    controls: Controls, craft: Craft, per_mass: float, per_inertia: float, ns: Namespace
-) -> tuple[float, float, float]:
+def _pushes(controls: Controls, craft: Craft, per_mass: float, per_inertia: float) -> tuple[float, float, float]:
     """`actuation` times the factors."""
-    thrust, side, turn = actuation(controls, craft, ns)
+    thrust, side, turn = actuation(controls, craft)
     return thrust * per_mass, side * per_mass, turn * per_inertia
 
 
-def _with_plain_drag(
-    controls: Controls, craft: Craft, per_mass: float, per_inertia: float, ns: Namespace
-) -> LoadFunction:
-    cos, sin, sqrt = ns.cos, ns.sin, ns.sqrt
+def _with_plain_drag(controls: Controls, craft: Craft, per_mass: float, per_inertia: float) -> LoadFunction:
+    cos, sin, sqrt = math.cos, math.sin, math.sqrt
     k, x_d = craft.drag_factor, craft.drag_center
     drag, turning_drag = k * per_mass, k * x_d * per_inertia
-    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia, ns)
+    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia)
 
     def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float, float]:
         c = cos(heading)
@@ -169,9 +157,8 @@ def air_speed(heading: float, vx: float, vy: float, yaw_rate: float, x_d: float)
 
 
 def _without_drag(controls: Controls, craft: Craft, per_mass: float, per_inertia: float) -> LoadFunction:
-    """One craft only."""
     cos, sin = math.cos, math.sin
-    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia, math)
+    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia)
 
     def loads_at(heading: float, _vx: float, _vy: float, _yaw_rate: float) -> tuple[float, float, float, float]:
         c = cos(heading)
@@ -181,23 +168,21 @@ def _without_drag(controls: Controls, craft: Craft, per_mass: float, per_inertia
     return loads_at
 
 
-def _with_any_drag(
-    controls: Controls, craft: Craft, per_mass: float, per_inertia: float, ns: Namespace
-) -> LoadFunction:
+def _with_any_drag(controls: Controls, craft: Craft, per_mass: float, per_inertia: float) -> LoadFunction:
     """Drag in wind, of constant or directional area, and with a moment of its own.
 
     Air that comes from the direction (u, w)/q sees the box with the area H*(W*|u| + L*|w|)/q: its walls stand square,
     and each shows the cosine of its angle to the air. Times q, that is the drag per air speed, without a square root:
     it takes the place of q, and k is 1.
     """
-    cos, sin, sqrt = ns.cos, ns.sin, ns.sqrt
+    cos, sin, sqrt = math.cos, math.sin, math.sqrt
     directional = craft.drag_area == DIRECTIONAL
     factor_ahead, factor_abeam = craft.drag_factor_ahead, craft.drag_factor_abeam
     x_d, spin = craft.drag_center, craft.spin_drag_factor * per_inertia
-    single, wind_x, wind_y = ns is math, controls.wind_x, controls.wind_y
-    k = (1.0 if directional else craft.drag_factor) if single else ns.where(directional, 1.0, craft.drag_factor)
+    wind_x, wind_y = controls.wind_x, controls.wind_y
+    k = 1.0 if directional else craft.drag_factor
     drag, turning_drag = k * per_mass, k * x_d * per_inertia
-    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia, ns)
+    thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia)
 
     def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float, float]:
         c = cos(heading)
@@ -206,12 +191,7 @@ def _with_any_drag(
         air_y = vy - wind_y
         u = c * air_x + s * air_y
         w = c * air_y - s * air_x + yaw_rate * x_d
-        if not single:
-            q = ns.where(directional, factor_ahead * abs(u) + factor_abeam * abs(w), sqrt(u * u + w * w))
-        elif directional:
-            q = factor_ahead * abs(u) + factor_abeam * abs(w)
-        else:
-            q = sqrt(u * u + w * w)
+        q = factor_ahead * abs(u) + factor_abeam * abs(w) if directional else sqrt(u * u + w * w)
         ahead = thrust - drag * u * q
         abeam = side - drag * w * q
         moment = turn - turning_drag * w * q - spin * yaw_rate * abs(yaw_rate)
@@ -231,22 +211,22 @@ def _with_any_drag(
 # speed q = sqrt(v^2 + (rho*r)^2):  F = -F_max*v/q,  M = -F_max*rho^2*r/q.
 
 
-def friction_radius(craft: Craft, ns: Namespace = math) -> float:
+def friction_radius(craft: Craft) -> float:
     """m: rho, the mean distance of the points of the L x W rectangle from its centre.
 
     With the diagonal d: d/6 + (L^2/W*ln((W + d)/L) + W^2/L*ln((L + d)/W))/12, the integral of the distance over the
     rectangle, cut into eight right triangles with a corner in the centre.
     """
     length, width = craft.length, craft.width
-    d = ns.sqrt(length * length + width * width)
-    along = length * length / width * ns.log((width + d) / length)
-    across = width * width / length * ns.log((length + d) / width)
-    return cast(float, d / 6 + (along + across) / 12)
+    d = math.sqrt(length * length + width * width)
+    along = length * length / width * math.log((width + d) / length)
+    across = width * width / length * math.log((length + d) / width)
+    return d / 6 + (along + across) / 12
 
 
-def slip_speed(vx: float, vy: float, turning: float, ns: Namespace = math) -> float:
+def slip_speed(vx: float, vy: float, turning: float) -> float:
     """m/s: q, from the velocity and rho*r."""
-    return cast(float, ns.sqrt(vx * vx + vy * vy + turning * turning))
+    return math.sqrt(vx * vx + vy * vy + turning * turning)
 
 
 LEAST_SLIP = 1e-150
@@ -254,18 +234,17 @@ LEAST_SLIP = 1e-150
 
 
 def sliding_load_function(
-    controls: Controls, craft: Craft, per_mass: float = 1.0, per_inertia: float = 1.0, ns: Namespace = math
+    controls: Controls, craft: Craft, per_mass: float = 1.0, per_inertia: float = 1.0
 ) -> LoadFunction:
     """All loads on a craft that slides: those of `load_function`, and friction."""
-    free = load_function(controls, craft, per_mass, per_inertia, ns)
-    radius = friction_radius(craft, ns)
+    free = load_function(controls, craft, per_mass, per_inertia)
+    radius = friction_radius(craft)
     grip, turning_grip = craft.friction_force * per_mass, craft.friction_force * radius * per_inertia
-    larger = max if ns is math else ns.fmax
 
     def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float, float]:
         x, y, moment, kq = free(heading, vx, vy, yaw_rate)
         turning = radius * yaw_rate
-        slowness = 1.0 / larger(slip_speed(vx, vy, turning, ns), LEAST_SLIP)
+        slowness = 1.0 / max(slip_speed(vx, vy, turning), LEAST_SLIP)
         return (
             x - grip * slowness * vx,
             y - grip * slowness * vy,
@@ -276,9 +255,9 @@ def sliding_load_function(
     return loads_at
 
 
-def friction_gains(craft: Craft, h: float, ns: Namespace = math) -> tuple[float, float]:
+def friction_gains(craft: Craft, h: float) -> tuple[float, float]:
     """m/s: how much of v, and of rho*r, friction can take away in the time h [s]: F_max*h/m and F_max*rho^2*h/I."""
-    radius = friction_radius(craft, ns)
+    radius = friction_radius(craft)
     force = craft.friction_force
     return h * (force / craft.mass), h * (force * radius * radius / craft.inertia)
 
@@ -287,7 +266,7 @@ NEWTON = 30
 """The most iterations; three or four are made."""
 
 
-def friction_function(craft: Craft, h: float, ns: Namespace = math) -> Friction:
+def friction_function(craft: Craft, h: float) -> Friction:
     """What friction makes, in the time h [s], of velocities that were reached without it: an implicit step.
 
     With a and b of `friction_gains`, and q the slip speed at the end, v' = v - a*v'/q and r' = r - b*r'/q, so
@@ -296,75 +275,65 @@ def friction_function(craft: Craft, h: float, ns: Namespace = math) -> Friction:
     side's reciprocal square root, nearly a straight line: from the left of the root it climbs to it and never beyond
     (More, Sorensen, Computing a trust region step, 1983). It never adds energy, and never turns a motion round.
     """
-    a, b = friction_gains(craft, h, ns)
-    radius = friction_radius(craft, ns)
-    single = ns is math
-    larger, sqrt, slowest = max if single else ns.fmax, ns.sqrt, (max if single else ns.fmax)(a, b)
+    a, b = friction_gains(craft, h)
+    radius = friction_radius(craft)
+    sqrt, slowest = math.sqrt, max(a, b)
 
     def rubbed(vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float]:
         turning = radius * yaw_rate
         straight, turned = vx * vx + vy * vy, turning * turning
-        holds = straight * (b * b) + turned * (a * a) <= (a * a) * (b * b)
-        if single and holds:
+        if straight * (b * b) + turned * (a * a) <= (a * a) * (b * b):  # it holds
             return 0.0, 0.0, 0.0
-        if not single:  # of those at rest, or without friction, nothing is left to solve
-            straight, turned = ns.where(holds, 1.0, straight), ns.where(holds, 1.0, turned)
-        q = larger(sqrt(straight + turned) - slowest, 0.0)
+        q = max(sqrt(straight + turned) - slowest, 0.0)
         for _ in range(NEWTON):
             of_v, of_r = q + a, q + b
             part_v, part_r = straight / (of_v * of_v), turned / (of_r * of_r)
             size = part_v + part_r
             new = q + size * (sqrt(size) - 1.0) / (part_v / of_v + part_r / of_r)
-            if not (new > q if single else ns.any(new > q)):
+            if not new > q:
                 break
-            q = larger(q, new)
+            q = new
         of_v, of_r = q / (q + a), q / (q + b)
-        if not single:
-            left = ns.where(a > 0.0, 0.0, 1.0)
-            of_v, of_r = ns.where(holds, left, of_v), ns.where(holds, left, of_r)
         return vx * of_v, vy * of_v, yaw_rate * of_r
 
     return rubbed
 
 
-def loads(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> Loads:
+def loads(state: State, controls: Controls, craft: Craft) -> Loads:
     """Force [N, world frame] and moment [N.m] on the craft: thrust, bow thrusters, air drag and friction."""
     if not craft.rubs:
-        return Loads(*load_function(controls, craft, ns=ns)(*state[2:])[:3])
-    sliding = Loads(*sliding_load_function(controls, craft, ns=ns)(*state[2:])[:3])
-    at_rest = (state.vx == 0.0) & (state.vy == 0.0) & (state.yaw_rate == 0.0)
-    if ns is math:
-        return _loads_at_rest(state, controls, craft, ns) if at_rest else sliding
-    held = _loads_at_rest(state, controls, craft, ns)
-    return Loads(*(ns.where(at_rest, still, moving) for still, moving in zip(held, sliding, strict=True)))
+        return Loads(*load_function(controls, craft)(*state[2:])[:3])
+    if state.vx == 0.0 and state.vy == 0.0 and state.yaw_rate == 0.0:
+        return _loads_at_rest(state, controls, craft)
+    return Loads(*sliding_load_function(controls, craft)(*state[2:])[:3])
 
 
-def _loads_at_rest(state: State, controls: Controls, craft: Craft, ns: Namespace) -> Loads:
+def _loads_at_rest(state: State, controls: Controls, craft: Craft) -> Loads:
     """What friction leaves of a push on a craft at rest: its implicit step from rest, over any time, gives the rate."""
-    force_x, force_y, moment, _ = load_function(controls, craft, ns=ns)(*state[2:])
-    rate = friction_function(craft, 1.0, ns)
+    force_x, force_y, moment, _ = load_function(controls, craft)(*state[2:])
+    rate = friction_function(craft, 1.0)
     ax, ay, turning = rate(force_x / craft.mass, force_y / craft.mass, moment / craft.inertia)
     return Loads(craft.mass * ax, craft.mass * ay, craft.inertia * turning)
 
 
-def drag_per_speed(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> float:
+def drag_per_speed(state: State, controls: Controls, craft: Craft) -> float:
     """k*q [kg/s]: the drag per air speed of the centre of drag."""
-    return load_function(controls, craft, ns=ns)(*state[2:])[3]
+    return load_function(controls, craft)(*state[2:])[3]
 
 
-def derivatives(state: State, controls: Controls, craft: Craft, ns: Namespace = math) -> Derivatives:
+def derivatives(state: State, controls: Controls, craft: Craft) -> Derivatives:
     """The equations of motion: m*dv/dt = force, I*dr/dt = moment, d(pose)/dt = velocity (Newton, Euler)."""
-    force_x, force_y, moment = loads(state, controls, craft, ns)
+    force_x, force_y, moment = loads(state, controls, craft)
     return Derivatives(
         state.vx, state.vy, state.yaw_rate, force_x / craft.mass, force_y / craft.mass, moment / craft.inertia
     )
 
 
-def body_velocity(state: State, ns: Namespace = math) -> tuple[float, float]:
+def body_velocity(state: State) -> tuple[float, float]:
     """Surge and sway [m/s]: the velocity of the centre of gravity in the body frame."""
     _, _, heading, vx, vy, _ = state
-    c = ns.cos(heading)
-    s = ns.sin(heading)
+    c = math.cos(heading)
+    s = math.sin(heading)
     return c * vx + s * vy, c * vy - s * vx
 
 

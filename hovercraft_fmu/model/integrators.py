@@ -4,11 +4,10 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
-from .craft import Craft, any_of
+from .craft import Craft
 from .dynamics import (
     Controls,
     LoadFunction,
-    Namespace,
     State,
     actuation,
     air_speed,
@@ -38,28 +37,24 @@ class Stretch(NamedTuple):
     """s: the step that the adaptive method would take next; 0 for the others"""
 
 
-Integrate: TypeAlias = Callable[[State, Controls, Craft, float, int, Namespace], Stretch]
-"""(state, controls, craft, sub-step h [s], number of sub-steps n, namespace) -> after n*h."""
+Integrate: TypeAlias = Callable[[State, Controls, Craft, float, int], Stretch]
+"""(state, controls, craft, sub-step h [s], number of sub-steps n) -> after n*h."""
 
 
-def semi_implicit_euler(
-    state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math
-) -> Stretch:
+def semi_implicit_euler(state: State, controls: Controls, craft: Craft, h: float, n: int) -> Stretch:
     """Symplectic Euler: loads from the start of the sub-step, velocity first, then the pose from the new velocity.
 
     First order; friction is an implicit step of its own, between the two. The loop holds plain numbers: an object made
     at every sub-step would cost more than the physics.
     """
-    if ns is math and craft.drag_factor and craft.plain_drag and not craft.rubs and not windy(controls):
+    if craft.drag_factor and craft.plain_drag and not craft.rubs and not windy(controls):
         return _plain_euler(state, controls, craft, h, n)
-    push_at = load_function(controls, craft, h / craft.mass, h / craft.inertia, ns)
-    rubbed = friction_function(craft, h, ns) if craft.rubs else None
-    larger, smaller = (max, min) if ns is math else (ns.fmax, ns.fmin)
+    push_at = load_function(controls, craft, h / craft.mass, h / craft.inertia)
+    rubbed = friction_function(craft, h) if craft.rubs else None
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
         push_x, push_y, turn, kq = push_at(heading, vx, vy, yaw_rate)
-        # `a = a + b`, never `a += b`: that would write into the caller's arrays
         vx = vx + push_x
         vy = vy + push_y
         yaw_rate = yaw_rate + turn
@@ -68,9 +63,9 @@ def semi_implicit_euler(
         x = x + h * vx
         y = y + h * vy
         heading = heading + h * yaw_rate
-        most, left, right = larger(most, kq), smaller(left, yaw_rate), larger(right, yaw_rate)
-    most = larger(most, push_at(heading, vx, vy, yaw_rate)[3])
-    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * larger(right, -left))
+        most, left, right = max(most, kq), min(left, yaw_rate), max(right, yaw_rate)
+    most = max(most, push_at(heading, vx, vy, yaw_rate)[3])
+    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
 
 def _plain_euler(state: State, controls: Controls, craft: Craft, h: float, n: int) -> Stretch:
@@ -107,7 +102,7 @@ def _plain_euler(state: State, controls: Controls, craft: Craft, h: float, n: in
     return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
 
-def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math) -> Stretch:
+def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: int) -> Stretch:
     """Drag solved implicitly with its factor k*q from the start of the sub-step; the pose from the new velocity.
 
     First order, stable at any step. With g = h*k*q the implicit step in the body frame is
@@ -128,14 +123,12 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     In wind the same holds of the velocity through the air, which is what drag takes away. A moment of the rotation
     itself, -d r |r|, adds h d |r| to I on the left side. Friction is an implicit step of its own, after it.
     """
-    loads_at = load_function(controls, craft, ns=ns)
-    rubbed = friction_function(craft, h, ns) if craft.rubs else None
-    in_wind, spins = windy(controls), any_of(craft.rotational_drag)
+    loads_at = load_function(controls, craft)
+    rubbed = friction_function(craft, h) if craft.rubs else None
+    in_wind, spins = windy(controls), craft.rotational_drag != 0.0
     wind_x, wind_y, spin = controls.wind_x, controls.wind_y, craft.spin_drag_factor
-    thrust, side, turn = actuation(controls, craft, ns)
-    cos, sin = ns.cos, ns.sin
-    larger, smaller = (max, min) if ns is math else (ns.fmax, ns.fmin)
-    fast = ns is math and not rubbed
+    thrust, side, turn = actuation(controls, craft)
+    cos, sin = math.cos, math.sin
     mass, inertia, x_d = craft.mass, craft.inertia, craft.drag_center
     damped, arm, square = inertia, mass * x_d * x_d, x_d * x_d
     x, y, heading, vx, vy, yaw_rate = state
@@ -161,72 +154,52 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
         vy = kept * vy + (s * surge + c * sway)
         if in_wind:
             vx, vy = vx + wind_x, vy + wind_y
-        if fast:
-            if kq > most:
-                most = kq
-            if yaw_rate > right:
-                right = yaw_rate
-            elif yaw_rate < left:
-                left = yaw_rate
-        else:
-            if rubbed:
-                vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
-            most, left, right = larger(most, kq), smaller(left, yaw_rate), larger(right, yaw_rate)
+        if rubbed:
+            vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
+        if kq > most:
+            most = kq
+        if yaw_rate > right:
+            right = yaw_rate
+        elif yaw_rate < left:
+            left = yaw_rate
         x = x + h * vx
         y = y + h * vy
         heading = heading + h * yaw_rate
-    most = larger(most, loads_at(heading, vx, vy, yaw_rate)[3])
-    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * larger(right, -left))
+    most = max(most, loads_at(heading, vx, vy, yaw_rate)[3])
+    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
 
-def rk4(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace = math) -> Stretch:
+def rk4(state: State, controls: Controls, craft: Craft, h: float, n: int) -> Stretch:
     """The classic Runge-Kutta method (Kutta 1901), fourth order; where friction could stop the craft, Euler's."""
     if craft.rubs:
-        return _rk4_with_friction(state, controls, craft, h, n, ns)
-    return _rk4(load_function(controls, craft, 1.0 / craft.mass, 1.0 / craft.inertia, ns), state, h, n, ns)
+        return _rk4_with_friction(state, controls, craft, h, n)
+    return _rk4(load_function(controls, craft, 1.0 / craft.mass, 1.0 / craft.inertia), state, h, n)
 
 
 NEAR_REST = 4.0
 """Sub-steps in which friction could stop the craft: nearer to rest, its force turns too far in a sub-step."""
 
 
-def _rk4_with_friction(state: State, controls: Controls, craft: Craft, h: float, n: int, ns: Namespace) -> Stretch:
+def _rk4_with_friction(state: State, controls: Controls, craft: Craft, h: float, n: int) -> Stretch:
     """While it slides, friction is a load like others, and smooth. Near rest it is not: an implicit step of Euler's."""
-    sliding = sliding_load_function(controls, craft, 1.0 / craft.mass, 1.0 / craft.inertia, ns)
-    radius = friction_radius(craft, ns)
-    larger = max if ns is math else ns.fmax
-    near = NEAR_REST * larger(*friction_gains(craft, h, ns))
+    sliding = sliding_load_function(controls, craft, 1.0 / craft.mass, 1.0 / craft.inertia)
+    radius = friction_radius(craft)
+    near = NEAR_REST * max(friction_gains(craft, h))
     drag_mass = rotation = 0.0
     for _ in range(n):
-        at_rest = slip_speed(state.vx, state.vy, radius * state.yaw_rate, ns) < near
-        if ns is not math:
-            stretch = _either(
-                at_rest,
-                semi_implicit_euler(state, controls, craft, h, 1, ns),
-                _rk4(sliding, state, h, 1, ns),
-                ns,
-            )
-        elif at_rest:
+        if slip_speed(state.vx, state.vy, radius * state.yaw_rate) < near:
             stretch = semi_implicit_euler(state, controls, craft, h, 1)
         else:
-            stretch = _rk4(sliding, state, h, 1, ns)
-        state, drag_mass = stretch.state, larger(drag_mass, stretch.drag_mass)
-        rotation = larger(rotation, stretch.rotation)
+            stretch = _rk4(sliding, state, h, 1)
+        state, drag_mass = stretch.state, max(drag_mass, stretch.drag_mass)
+        rotation = max(rotation, stretch.rotation)
     return Stretch(state, n, drag_mass, rotation)
 
 
-def _either(condition: bool, this: Stretch, other: Stretch, ns: Namespace) -> Stretch:
-    """For arrays of craft: of each the one stretch or the other."""
-    state = State(*(ns.where(condition, a, b) for a, b in zip(this.state, other.state, strict=True)))
-    drag_mass = ns.where(condition, this.drag_mass, other.drag_mass)
-    return Stretch(state, this.substeps, drag_mass, ns.where(condition, this.rotation, other.rotation))
-
-
-def _rk4(acceleration_at: LoadFunction, state: State, h: float, n: int, ns: Namespace) -> Stretch:
+def _rk4(acceleration_at: LoadFunction, state: State, h: float, n: int) -> Stretch:
     """The derivative of the pose is the velocity, so the pose needs no stages of its own:
     h/6 (v1 + 2 v2 + 2 v3 + v4) = h v + h^2/6 (a1 + a2 + a3).
     """
-    single = ns is math
     half, sixth, square = 0.5 * h, h / 6.0, h * h / 6.0
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
@@ -244,19 +217,12 @@ def _rk4(acceleration_at: LoadFunction, state: State, h: float, n: int, ns: Name
         vx = vx + sixth * (ax1 + 2.0 * ax2 + 2.0 * ax3 + ax4)
         vy = vy + sixth * (ay1 + 2.0 * ay2 + 2.0 * ay3 + ay4)
         yaw_rate = yaw_rate + sixth * (m1 + 2.0 * m2 + 2.0 * m3 + m4)
-        if single:
-            if not (kq1 <= most and kq2 <= most and kq3 <= most and kq4 <= most):
-                most = max(most, kq1, kq2, kq3, kq4)
-            if not (left <= r2 <= right and left <= r3 <= right and left <= r4 <= right and left <= yaw_rate <= right):
-                left, right = min(left, r2, r3, r4, yaw_rate), max(right, r2, r3, r4, yaw_rate)
-        else:
-            for kq in (kq1, kq2, kq3, kq4):
-                most = ns.fmax(most, kq)
-            for rate in (r2, r3, r4, yaw_rate):
-                left, right = ns.fmin(left, rate), ns.fmax(right, rate)
-    largest = max if single else ns.fmax
-    most = largest(most, acceleration_at(heading, vx, vy, yaw_rate)[3])
-    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * largest(right, -left))
+        if not (kq1 <= most and kq2 <= most and kq3 <= most and kq4 <= most):
+            most = max(most, kq1, kq2, kq3, kq4)
+        if not (left <= r2 <= right and left <= r3 <= right and left <= r4 <= right and left <= yaw_rate <= right):
+            left, right = min(left, r2, r3, r4, yaw_rate), max(right, r2, r3, r4, yaw_rate)
+    most = max(most, acceleration_at(heading, vx, vy, yaw_rate)[3])
+    return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
 
 # Dormand, Prince: A family of embedded Runge-Kutta formulae (1980), the pair 5(4) with 7 stages; the last is the fifth

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from .craft import Craft
-from .dynamics import Controls, Namespace, State
+from .dynamics import Controls, State
 from .integrators import INTEGRATORS, Integrator, Stretch, adaptive
 
 MAX_SUBSTEPS = 10**9
@@ -94,7 +94,6 @@ def advance(
     craft: Craft,
     communication_step: float,
     settings: Settings = Settings(),  # noqa: B008 - immutable
-    ns: Namespace = math,
     proposed: float = 0.0,
 ) -> Stretch:
     """The state one communication step [s] later, with the controls held, and how it got there.
@@ -103,23 +102,21 @@ def advance(
 
     Raises:
         ValueError: see `substeps`.
-        NonFiniteError: the motion left the range of numbers (plain floats only; arrays of craft are not searched).
+        NonFiniteError: the motion left the range of numbers.
         StepTooSmallError: the adaptive method cannot meet its tolerance.
     """
     if communication_step == 0.0:
         return Stretch(state, 0, 0.0, 0.0, proposed)
     method = settings.integrator.integrate
     if method is None:
-        if ns is not math:
-            raise ValueError("integrator = 'adaptive': must be another one for arrays of craft, which share the step")
         check_communication_step(communication_step)
         return adaptive(state, controls, craft, communication_step, settings.tolerance, proposed or settings.step_size)
     n, h = substeps(communication_step, settings.step_size)
     try:
-        stretch = method(state, controls, craft, h, n, ns)
+        stretch = method(state, controls, craft, h, n)
     except (ValueError, OverflowError):  # what math.sin says of an infinite angle
         stretch = Stretch(State(*[math.nan] * 6), n, 0.0, 0.0)
-    if ns is math and not math.isfinite(sum(stretch.state)):
+    if not math.isfinite(sum(stretch.state)):
         _refuse_non_finite(stretch.state, h)
     return stretch
 
