@@ -1,10 +1,36 @@
 """A hovercraft as an FMU: build it, run it."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from ._version import __version__
-from .building import build
-from .fmu.python_package import build_fmu
-from .host import SimulationError
-from .host.fleet import Crafts, advance_fleet
-from .simulation import Result, simulate
+
+if TYPE_CHECKING:
+    from .building import build
+    from .fmu.python_package import build_fmu
+    from .host import SimulationError
+    from .host.fleet import Crafts, advance_fleet
+    from .simulation import Result, simulate
+
+_HOMES = {
+    "Crafts": "host.fleet",
+    "Result": "simulation",
+    "SimulationError": "host",
+    "advance_fleet": "host.fleet",
+    "build": "building",
+    "build_fmu": "fmu.python_package",
+    "simulate": "simulation",
+}
+"""Where each name is from: a module is loaded when something of it is asked for, as most take others with them."""
 
 __all__ = ["Crafts", "Result", "SimulationError", "__version__", "advance_fleet", "build", "build_fmu", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

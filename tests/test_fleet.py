@@ -3,6 +3,7 @@
 import math
 import threading
 from dataclasses import astuple, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hovercraft_fmu import advance_fleet
+from hovercraft_fmu.examples import cloud
 from hovercraft_fmu.host.fleet import Crafts, observe_fleet
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
@@ -244,6 +246,12 @@ def test_the_interpreter_goes_on_meanwhile() -> None:
         counted += 1
     thread.join()
     assert counted > 1000
+
+
+def test_the_cloud_of_ten_thousand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cloud.main(tmp_path / "cloud.png")
+    assert "10000 craft" in capsys.readouterr().out
+    assert (tmp_path / "cloud.png").stat().st_size > 20000
 
 
 def test_constants_are_in_the_order_of_the_craft() -> None:
