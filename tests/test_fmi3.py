@@ -23,7 +23,8 @@ from hovercraft_fmu.host import read_description
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, run_fmu
 from tests.lowlevel import everything, one, put, reference, start
-from tests.test_native import METHODS, STEPS
+from tests.native import STEPS
+from tests.test_native import METHODS
 
 OK, WARNING, ERROR = 0, 1, 3
 TERMS: dict[str, dict[str, float | str]] = {

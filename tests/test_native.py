@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from ctypes import CDLL, byref, c_bool, c_double, c_int, c_size_t, c_uint, c_void_p
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,19 +27,17 @@ from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STE
 from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.host import read_description
-from hovercraft_fmu.hosts import hosts_of, run_in
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, run_fmu, run_model
 from tests.blobs import signed, with_word
-from tests.conftest import FMI_2, ROOT
+from tests.conftest import FMI_2, ROOT, Built
 from tests.lowlevel import Instance3, count, everything, get, named, one, put, reference, start, worded
-from tests.native import c_compiler
+from tests.native import STEPS, c_compiler
 from tests.test_native_platforms import SANITIZERS
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 OUTPUTS = (*STATES, *MOTION)
 METHODS = {"semi_implicit_euler": 1, "drag_implicit": 2, "rk4": 3, "adaptive": 4}
-STEPS = {"semi_implicit_euler": 0.001, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
 
 
 @pytest.fixture(scope="module")
@@ -64,14 +63,6 @@ def test_every_scene_and_method_is_close_to_the_bare_model(name: str, method: st
     for column in (*INPUTS, *OUTPUTS):
         gap = np.abs(found[column] - expected[column])
         assert (gap <= 1e-12 * np.maximum(1.0, np.abs(expected[column]))).all(), column
-
-
-def test_other_hosts_give_the_bits_that_fmpy_gives(each_native_fmu: Path) -> None:
-    expected = run_in("fmpy", each_native_fmu)
-    for name, host in hosts_of(each_native_fmu).items():
-        if missing := host.missing():
-            pytest.skip(f"{name}: {missing}")
-        assert run_in(name, each_native_fmu) == expected, name
 
 
 # ---- ramps
@@ -589,7 +580,7 @@ def test_versions(loaded: Any) -> None:
 # ---- sanitized
 
 
-def sanitized(fmu: Path, flavour: Flavour, folder: Path) -> Path:
+def sanitized(path: Path, fmu: Path, flavour: Flavour, folder: Path) -> Path:
     """The FMU with a library for this machine that watches memory and undefined behaviour."""
     with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
@@ -600,7 +591,6 @@ def sanitized(fmu: Path, flavour: Flavour, folder: Path) -> Path:
     headers = ("-I", str(C_FOLDER / f"fmi{flavour.fmi}"), f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX")
     subprocess.run([*command, *headers, flavour.unit, "-o", "x.so"], cwd=folder, check=True)
     files[f"binaries/{binary('x86_64-linux', flavour)}"] = (folder / "x.so").read_bytes()
-    path = folder / "Sanitized.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in files.items():
             archive.writestr(name, content)
@@ -608,10 +598,15 @@ def sanitized(fmu: Path, flavour: Flavour, folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def sanitized_fmus(native_fmu: Path, native3_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def sanitized_fmus(
+    native_fmu: Path, native3_fmu: Path, built: Built, tmp_path_factory: pytest.TempPathFactory
+) -> list[Path]:
     """Those of FMI 2.0 and of FMI 3.0."""
-    pairs = ((native_fmu, NATIVE), (native3_fmu, NATIVE3))
-    return [sanitized(fmu, flavour, tmp_path_factory.mktemp("sanitized")) for fmu, flavour in pairs]
+    makers = [
+        partial(sanitized, fmu=fmu, flavour=flavour, folder=tmp_path_factory.mktemp("sanitized"))
+        for fmu, flavour in ((native_fmu, NATIVE), (native3_fmu, NATIVE3))
+    ]
+    return [built(f"Sanitized{number}.fmu", make) for number, make in enumerate(makers)]
 
 
 @pytest.mark.once

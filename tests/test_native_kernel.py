@@ -17,12 +17,11 @@ from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, Str
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, stability_number
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, schedule
-from tests.native import C_TESTS, Kernel, Text, compile_c
+from tests.native import C_TESTS, STEPS, Kernel, Text, compile_c
 from tests.strategies import calm_crafts, controls, crafts, numbers, states
 
 KERNEL, TRIG, LOGARITHM = (C_FOLDER / f"{name}.c" for name in ("kernel", "trig", "logarithm"))
 SHARED = ("-shared", "-fPIC", "-lm")
-STEPS = {"semi_implicit_euler": 0.001, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
 METHODS = {method.name: method for method in INTEGRATORS}
 
 
@@ -102,7 +101,7 @@ SLOW = st.builds(State, heading=numbers(-4.0, 4.0), vx=AT_OR_NEAR_REST, vy=AT_OR
 CRAFT_AND_STATE = st.one_of(st.tuples(crafts, states), st.tuples(calm_crafts, states), st.tuples(RUBBING, SLOW))
 
 
-@settings(max_examples=1000)
+@settings(max_examples=500)
 @given(
     craft_and_state=CRAFT_AND_STATE,
     held=controls,
@@ -130,7 +129,7 @@ def test_random_craft_states_controls_and_steps(
     assert expected is None or made == expected
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(craft=calm_crafts, state=states, held=controls, method=st.sampled_from(INTEGRATORS), step=numbers(1e-4, 0.1))
 def test_shipped_sine_and_cosine_are_close(
     craft: Craft, state: State, held: Controls, method: object, step: float, shipped: Kernel

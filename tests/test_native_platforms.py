@@ -20,11 +20,10 @@ from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Run, plan, schedule
 from tests.lowlevel import one
-from tests.native import C_INCLUDES, C_TESTS, c_compiler
+from tests.native import C_INCLUDES, C_TESTS, STEPS, c_compiler
 
 pytestmark = pytest.mark.once
 
-STEPS = {"semi_implicit_euler": 0.001, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
 HASHED = (*STATES, *MOTION, "force.x", "force.y", "moment", "stability_number")
 """What the host in C hashes, in its order."""
 ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
