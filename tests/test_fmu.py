@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, WATCHED
-from hovercraft_fmu.host import SimulationError, read_description
+from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Result, Run, plan, run_fmu, run_model
