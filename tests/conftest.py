@@ -33,15 +33,22 @@ HERE = {"linux": ["x86_64-linux"], "win32": ["x86_64-windows"], "darwin": ["x86_
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """Make an archive of this tree once a run: whichever of pytest's workers asks first makes it, the others wait."""
+def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One for all of pytest's workers in this run; what is made in it is made under a lock."""
     base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "built"
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared"
     folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def built(shared_folder: Path) -> Built:
+    """Make an archive of this tree once a run: whichever of pytest's workers asks first makes it, the others wait."""
 
     def once(name: str, make: Callable[[Path], Path]) -> Path:
-        with FileLock(folder / f"{name}.lock"):
-            return folder / name if (folder / name).exists() else make(folder / name)
+        path = shared_folder / name
+        with FileLock(f"{path}.lock"):
+            return path if path.exists() else make(path)
 
     return once
 

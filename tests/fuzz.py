@@ -1,5 +1,6 @@
 """python -m tests.fuzz [SECONDS]: any sequence of FMI calls on sanitized native FMUs, by default ten minutes each."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -21,21 +22,26 @@ def missing() -> str:
     return "" if shutil.which("clang") and sys.platform == "linux" else "no clang: apt-get install clang"
 
 
-def fuzz(folder: Path, seconds: int, flavour: Flavour = NATIVE) -> str:
-    """Run for so long in a folder; libFuzzer's report. Raises AssertionError with it where there is a finding."""
-    header = written_sources(folder, flavour) / "variables.h"
+def compiled(folder: Path, flavour: Flavour = NATIVE) -> Path:
+    """The program, of the sources in that folder."""
+    header, program = folder / "variables.h", folder / "fuzz"
     text = header.read_text(encoding="utf-8")
     assert text.count(BLOCK) == 1
     header.write_text(text.replace(BLOCK, BLOCK_TO_WRITE), encoding="utf-8")
     command = ["clang", "-std=c11", "-Wall", "-Wextra", "-ffp-contract=off", *SANITIZE, f"-DFMI={flavour.fmi}",
-               f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX", "-I",
-               str(folder), *C_INCLUDES, str(folder / flavour.unit), str(C_TESTS / "fuzz.c"), "-o",
-               str(folder / "fuzz")]  # fmt: skip
+               f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX", "-I", str(folder), *C_INCLUDES,
+               str(folder / flavour.unit), str(C_TESTS / "fuzz.c"), "-o", str(program)]  # fmt: skip
     built = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (built.returncode, built.stderr) == (0, "")
-    run = [str(folder / "fuzz"), f"-max_total_time={seconds}", "-max_len=4000", "-timeout=30", "-seed=1",
-           "-print_final_stats=1", "-verbosity=0"]  # fmt: skip
-    done = subprocess.run(run, cwd=folder, capture_output=True, text=True, check=False)
+    return program
+
+
+def fuzz(program: Path, limit: str, **env: str) -> str:
+    """Run up to a limit of libFuzzer's; its report. Raises AssertionError with it where there is a finding."""
+    command = [str(program), limit, "-max_len=4000", "-timeout=30", "-seed=1", "-print_final_stats=1", "-verbosity=0"]
+    done = subprocess.run(
+        command, cwd=program.parent, env={**os.environ, **env}, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr[-5000:]
     return done.stderr
 
@@ -43,6 +49,7 @@ def fuzz(folder: Path, seconds: int, flavour: Flavour = NATIVE) -> str:
 if __name__ == "__main__":
     if missing():
         sys.exit(missing())
+    seconds = int(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT
     for each in (NATIVE, NATIVE3):
         with tempfile.TemporaryDirectory() as place:
-            print(fuzz(Path(place), int(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT, each))
+            print(fuzz(compiled(written_sources(Path(place), each), each), f"-max_total_time={seconds}"))

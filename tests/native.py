@@ -1,5 +1,6 @@
 """The C of the native FMU as this machine's compiler builds it, through ctypes."""
 
+import itertools
 import subprocess
 from collections.abc import Iterable, Sequence
 from ctypes import CDLL, POINTER, Structure, byref, c_bool, c_char_p, c_double, c_int32, c_int64, create_string_buffer
@@ -17,6 +18,7 @@ from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS, Stretch
 from hovercraft_fmu.model.subcycling import Settings
+from hovercraft_fmu.scenes import SCENES
 
 C_TESTS = Path(__file__).parent / "c"
 KERNEL_FILES = tuple(C_FOLDER / f"{name}.c" for name in ("kernel", "trig", "logarithm"))
@@ -26,6 +28,8 @@ OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
 NO_RAMP = Controls(0.0)
 STEPS = {"semi_implicit_euler": 0.01, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
 """s: a sub-step for each method, with which none of the scenes warns"""
+IN_TURN = dict(zip(SCENES, itertools.cycle(STEPS), strict=False))
+"""A method for every scene, where all of them with all are another test's."""
 
 
 def c_compiler() -> str:

@@ -27,12 +27,11 @@ from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STE
 from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.host import read_description
-from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import plan, run_fmu, run_model
 from tests.blobs import signed, with_word
 from tests.conftest import FMI_2, ROOT, Built
 from tests.lowlevel import Instance3, count, everything, get, named, one, put, reference, start, worded
-from tests.native import STEPS, c_compiler
+from tests.native import IN_TURN, STEPS, c_compiler
 from tests.test_native_platforms import SANITIZERS
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
@@ -53,9 +52,9 @@ def ramp(instance: Any, **rates: float) -> None:
 # ---- the model
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", SCENES)
-def test_every_scene_and_method_is_close_to_the_bare_model(name: str, method: str, native_fmu: Path) -> None:
+@pytest.mark.parametrize(("name", "method"), IN_TURN.items())
+def test_every_scene_is_close_to_the_bare_model(name: str, method: str, native_fmu: Path) -> None:
+    """With one of the methods; all with all are in test_native_kernel.py."""
     run = plan(name, start_values={"integrator": method, "step_size": STEPS[method]})
     found, expected = run_fmu(run, native_fmu), run_model(run)
     assert found.warnings == ()
