@@ -5,7 +5,6 @@ import csv
 import itertools
 import json
 import math
-import os
 import signal
 import socket
 import subprocess
@@ -27,8 +26,6 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from hovercraft_fmu import simulate
-from hovercraft_fmu.autopilot.pilot_package import build_autopilot
-from hovercraft_fmu.cli import main
 from hovercraft_fmu.fmu.interface import STEP_UNSTABLE
 from hovercraft_fmu.model.dynamics import Controls
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator
@@ -43,6 +40,7 @@ from hovercraft_fmu.sweep.quantities import DERIVED, OBSERVED
 from hovercraft_fmu.sweep.study import Factor
 from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
 from tests.conftest import ROOT
+from tests.shell import Shell
 
 COARSE = {"integrator": "rk4", "step_size": 0.1}
 MASSES: dict[str, Any] = {
@@ -75,7 +73,7 @@ def test_a_run_has_the_bits_of_simulate(scene: str, each_fmu: Path, tmp_path: Pa
     """At every communication point, whatever was run on the instance before."""
     study = {
         "scene": scene,
-        "stop_time": 12.0,
+        "stop_time": 8.0,
         "set": {"step_size": 0.01},
         "sweep": {"mass": [60.0, 170.0], "integrator": [method.name for method in INTEGRATORS]},
         "keep": {"trajectory": {"every": 0.1, "of": list(OBSERVED)}},
@@ -84,7 +82,7 @@ def test_a_run_has_the_bits_of_simulate(scene: str, each_fmu: Path, tmp_path: Pa
     paths = load(tmp_path, "trajectories")
     for row in rows(load(tmp_path)):
         settings = {"step_size": 0.01, "mass": row["mass"], "integrator": row["integrator"]}
-        alone = simulate(scene, each_fmu, start_values=settings, stop_time=12.0)
+        alone = simulate(scene, each_fmu, start_values=settings, stop_time=8.0)
         own = paths.filter(pc.equal(paths["run"], row["run"]))
         for name in ("time", *OBSERVED):
             assert np.array_equal(own[name].to_numpy(), alone[name]), (row, name)
@@ -92,12 +90,20 @@ def test_a_run_has_the_bits_of_simulate(scene: str, each_fmu: Path, tmp_path: Pa
 
 @pytest.mark.parametrize("method", [method.name for method in INTEGRATORS])
 @pytest.mark.parametrize("step_size", [0.1, 0.03])
-def test_what_is_kept_changes_no_bit(method: str, step_size: float, each_fmu: Path, tmp_path: Path) -> None:
+def test_what_is_kept_changes_no_bit(method: str, step_size: float, native_fmu: Path, tmp_path: Path) -> None:
+    assert_what_is_kept_changes_no_bit(method, step_size, native_fmu, tmp_path)
+
+
+def test_what_is_kept_changes_no_bit_of_any_fmu(each_fmu: Path, tmp_path: Path) -> None:
+    assert_what_is_kept_changes_no_bit("rk4", 0.1, each_fmu, tmp_path)
+
+
+def assert_what_is_kept_changes_no_bit(method: str, step_size: float, fmu: Path, tmp_path: Path) -> None:
     """Where the end alone is kept communication steps are made as one; the end is the same, what is watched and all."""
     changed = but(set={"integrator": method, "step_size": step_size})
     few = {"end": list(OBSERVED)}
-    sweep(but(changed, keep=few), each_fmu, workers=1, output=tmp_path / "few")
-    sweep(but(changed, keep=few | {"distance": True}), each_fmu, workers=1, output=tmp_path / "all")
+    sweep(but(changed, keep=few), fmu, workers=1, output=tmp_path / "few")
+    sweep(but(changed, keep=few | {"distance": True}), fmu, workers=1, output=tmp_path / "all")
     every = load(tmp_path / "all").drop_columns("distance")
     assert bits(load(tmp_path / "few")).equals(bits(every))
 
@@ -160,22 +166,6 @@ def test_a_failed_run_is_a_row_with_its_error(each_fmu: Path, tmp_path: Path) ->
     start: dict[str, Value] = {"integrator": "rk4", "step_size": 0.1, "drag_area": 2, "velocity.x": 5.0}
     alone = simulate("turn", each_fmu, start_values=start)
     assert [made[2][f"end.{name}"] for name in ("pose.x", "speed")] == [alone[name][-1] for name in ("pose.x", "speed")]
-
-
-def test_the_order_of_runs_changes_no_bit(each_fmu: Path) -> None:
-    """On one instance; failed ones are among them."""
-    study = read_study(FAILING)
-    job, _ = runner_module._job(study, each_fmu, "fmu")
-    numbers = np.arange(study.runs)
-    try:
-        made = [
-            runner_module.make_chunk(job, 0, order, study.samples(order)).runs.sort_by("run")
-            for order in (numbers, numbers[::-1], numbers[[4, 2, 0, 5, 1, 3]])
-        ]
-    finally:
-        runner_module.release(job.sweep)
-    assert made[0].equals(made[1])
-    assert made[0].equals(made[2])
 
 
 # ---- the batch
@@ -475,7 +465,7 @@ sweep(json.loads(sys.argv[1]), sys.argv[2], workers=1, output=sys.argv[3])
 def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> None:
     study = but(
         sweep={"mass": RANGE},
-        sampling={"method": "latin_hypercube", "runs": 96, "seed": 1},
+        sampling={"method": "latin_hypercube", "runs": 32, "seed": 1},
         keep={"distance": True, "trajectory": {"every": 30.0, "of": ["pose.x", "pose.y"]}},
     )
     there = tmp_path / "killed" / "runs"
@@ -489,7 +479,7 @@ def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> 
     made = len(list(there.glob("*.parquet")))
     assert 2 <= made < 32
     kept = {path: path.stat().st_mtime_ns for path in there.glob("*.parquet")}
-    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 96 - 3 * made
+    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 32 - made
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
     sweep(study, fmu, workers=1, output=tmp_path / "whole")
     for what in ("runs", "trajectories"):
@@ -497,14 +487,27 @@ def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("engine", ["fmu", "batch"])
-def test_a_chunk_has_a_bounded_size(engine: str, fmu: Path) -> None:
+@pytest.mark.parametrize("keep", [{"end": ["speed"]}, {"maximum": list(OBSERVED)}], ids=["end", "maximum"])
+@pytest.mark.usefixtures("fleet")
+def test_a_chunk_has_a_bounded_size(engine: str, keep: dict[str, Any], native_fmu: Path, tmp_path: Path) -> None:
+    """The first one of many is whole when the sweep is ended after it."""
+
+    class EndError(Exception):
+        pass
+
+    def end(made: int) -> None:
+        if made:
+            raise EndError
+
     many = {"method": "latin_hypercube", "runs": 100000, "seed": 1}
-    for keep in ({"end": ["speed"]}, {"maximum": list(OBSERVED)}):
-        study = read_study(but(sweep={"mass": RANGE}, sampling=many, keep=keep))
-        job, about = runner_module._job(study, fmu if engine == "fmu" else None, engine)
-        values = about["chunk"] * len(job.plan.timeline.times) * len(study.keep.read)
-        assert about["chunk"] <= runner_module.MOST_RUNS[engine]
-        assert values <= runner_module.MOST_VALUES
+    study = but(sweep={"mass": RANGE}, sampling=many, keep=keep)
+    with pytest.raises(EndError):
+        sweep(study, native_fmu if engine == "fmu" else None, engine=engine, workers=1, output=tmp_path, tell=end)
+    (chunk,) = (tmp_path / "runs").glob("*.parquet")
+    runs = pq.read_metadata(chunk).num_rows
+    assert 1 < runs <= runner_module.MOST_RUNS[engine]
+    if "maximum" in keep:
+        assert runs * 601 * len(OBSERVED) <= runner_module.MOST_VALUES
 
 
 # ---- on workers
@@ -575,9 +578,9 @@ def test_a_scheduler_that_is_not_there(fmu: Path, tmp_path: Path, monkeypatch: p
         sweep(MASSES, fmu, scheduler="nonsense", output=tmp_path)
 
 
-def test_an_fmu_of_another_model_is_refused(tmp_path: Path) -> None:
+def test_an_fmu_of_another_model_is_refused(tmp_path: Path, autopilot: Path) -> None:
     with pytest.raises(ValueError, match=r"Autopilot\.fmu: is an FMU of the model 'Autopilot': must be of"):
-        sweep(MASSES, build_autopilot(tmp_path / "Autopilot.fmu"), workers=1, output=tmp_path)
+        sweep(MASSES, autopilot, workers=1, output=tmp_path)
 
 
 def test_bad_arguments(tmp_path: Path, fmu: Path) -> None:
@@ -591,40 +594,37 @@ def test_bad_arguments(tmp_path: Path, fmu: Path) -> None:
             sweep(MASSES, fmu, output=tmp_path, **options)
     with pytest.raises(FileNotFoundError, match="no such FMU"):
         sweep(MASSES, tmp_path / "nix.fmu", output=tmp_path)
-    job, _ = runner_module._job(read_study(MASSES), fmu, "fmu")
+
+
+def test_a_worker_with_another_version_is_refused() -> None:
+    study = read_study(MASSES)
+    plan = runner_module.Plan(study.run, study.keep, timeline(study.run, study.keep))
+    job = runner_module.Job("any", "9.9", plan, (), None)
     with pytest.raises(ValueError, match=r"a worker has hovercraft-fmu .*: must be 9\.9"):
-        runner_module.make_chunk(replace(job, version="9.9"), 0, np.arange(1), {})
+        runner_module.make_chunk(job, 0, np.arange(1), {})
 
 
 # ---- pictures, the command
 
 
-@pytest.mark.parametrize("kind", ["curve", "map", "cloud", "points", "paths"])
-def test_pictures(kind: str, tmp_path: Path) -> None:
+def test_pictures_show_the_results(tmp_path: Path) -> None:
+    """Each kind of study has its own; it is drawn the same again, and otherwise where the results are others."""
     latin = {"method": "latin_hypercube", "runs": 12, "seed": 1}
     two = {"mass": RANGE, "air_density": {"from": 0.3, "to": 1.2}}
-    study = {
+    studies = {
         "curve": but(sweep={"mass": [60.0, 100.0, 170.0]}),
         "map": MASSES,
         "cloud": but(sweep=two, sampling=latin),
         "points": but(sweep=two | {"inertia": {"normal": [500.0, 20.0]}}, sampling=latin),
         "paths": but(keep={"trajectory": {"every": 1.0, "of": ["pose.x", "pose.y"]}}),
-    }[kind]
-    sweep(study, engine="batch", workers=1, output=tmp_path)
-    with Image.open(plot_sweep(tmp_path, tmp_path / "new" / "plot.png")) as picture:
-        assert len(picture.convert("RGB").getcolors(maxcolors=100000) or []) > 20
-
-
-def command(folder: Path, *arguments: str, env: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-    line = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", "sweep", *arguments]
-    return subprocess.run(
-        line,
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        env={**os.environ, "NO_COLOR": "1", **(env or {})},
-    )
+    }
+    others = {"curve of others": but(studies["curve"], set=COARSE | {"steering_force": 1.0})}
+    seen = set()
+    for kind, study in (studies | others).items():
+        sweep(study, engine="batch", workers=1, output=tmp_path / kind)
+        seen.add(plot_sweep(tmp_path / kind, tmp_path / "new" / f"{kind}.png").read_bytes())
+    assert len(seen) == 6
+    assert plot_sweep(tmp_path / "curve", tmp_path / "again.png").read_bytes() in seen
 
 
 STUDY = """
@@ -637,24 +637,21 @@ keep.end = ["speed"]
 """
 
 
-def test_the_command(tmp_path: Path) -> None:
+def test_the_command(tmp_path: Path, shell: Shell) -> None:
     (tmp_path / "masses.toml").write_text(STUDY)
-    done = command(tmp_path, "masses.toml", "--workers", "1", "--plot", "masses.png")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "build/sweep/masses: 6 runs, 6 of them made now in " in done.stdout
-    assert "3 failed; the first is run 1: thrust_min = 20.0 N: must not be above thrust_max = 10.0 N" in done.stdout
-    assert (tmp_path / "masses.png").stat().st_size > 10000
-    assert "6 runs, 0 of them made now" in command(tmp_path, "masses.toml", "--workers", "1").stdout
+    printed = shell.ok("sweep", "masses.toml", "--workers", "1", "--plot", "masses.png")
+    assert "build/sweep/masses: 6 runs, 6 of them made now in " in printed
+    assert "3 failed; the first is run 1: thrust_min = 20.0 N: must not be above thrust_max = 10.0 N" in printed
+    with Image.open(tmp_path / "masses.png") as picture:
+        picture.verify()
+    assert "6 runs, 0 of them made now" in shell.ok("sweep", "masses.toml", "--workers", "1")
     speeds = load(tmp_path / "build" / "sweep" / "masses")["end.speed"].drop_null().to_pylist()
     assert len(speeds) == 3
-    shown = next(line.split() for line in done.stdout.splitlines() if line.startswith("end.speed"))
+    shown = next(line.split() for line in printed.splitlines() if line.startswith("end.speed"))
     assert [shown[1], shown[9]] == [f"{min(speeds):.4g}", f"{max(speeds):.4g}"]
 
 
-def test_what_is_wrong_is_one_clear_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_what_is_wrong_is_one_clear_line(tmp_path: Path, shell: Shell) -> None:
     (tmp_path / "bad.toml").write_text(STUDY + "frob = 3\n")
     for arguments, message in (
         (("nix.toml",), "nix.toml: No such file or directory"),
@@ -663,20 +660,7 @@ def test_what_is_wrong_is_one_clear_line(
         (("turning_circle", "nix.fmu"), "nix.fmu: no such FMU"),
         (("turning_circle", "--engine", "steam"), "engine = 'steam': must be one of fmu, batch"),
     ):
-        with pytest.raises(SystemExit) as left:
-            main(["sweep", *arguments])
-        assert str(left.value).startswith("hovercraft-fmu: ")
-        assert message in str(left.value)
-        assert len(str(left.value).splitlines()) == 1
-    assert capsys.readouterr() == ("", "")
-
-
-def test_without_its_libraries_the_command_says_how_to_get_them(tmp_path: Path) -> None:
-    (tmp_path / "pyarrow.py").write_text("raise ModuleNotFoundError('gone', name='pyarrow')")  # hides the real one
-    done = command(tmp_path, "turning_circle")
-    assert done.returncode == 1
-    assert "sweeps need pyarrow, which is not installed: pip install 'hovercraft-fmu[sweep]'" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+        assert message in shell.refused("sweep", *arguments)
 
 
 @pytest.mark.once
@@ -708,7 +692,7 @@ def test_stopping_is_no_harm(fmu: Path, tmp_path: Path) -> None:
     """Ctrl-C: one line, and what was made is there."""
     (tmp_path / "many.toml").write_text(
         'scene = "turn"\nset.integrator = "rk4"\nset.step_size = 0.1\nkeep.distance = true\n'
-        "sweep.mass = { from = 50, to = 200, count = 600 }\n"
+        "sweep.mass = { from = 50, to = 200, count = 96 }\n"
     )
     line = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", "sweep"]
     process = subprocess.Popen(
