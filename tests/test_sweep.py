@@ -598,7 +598,7 @@ def test_bad_arguments(tmp_path: Path, fmu: Path) -> None:
 
 def test_a_worker_with_another_version_is_refused() -> None:
     study = read_study(MASSES)
-    plan = runner_module.Plan(study.run, study.keep, timeline(study.run, study.keep))
+    plan = Plan(study.run, study.keep, timeline(study.run, study.keep))
     job = runner_module.Job("any", "9.9", plan, (), None)
     with pytest.raises(ValueError, match=r"a worker has hovercraft-fmu .*: must be 9\.9"):
         runner_module.make_chunk(job, 0, np.arange(1), {})
