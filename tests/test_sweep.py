@@ -36,6 +36,7 @@ from hovercraft_fmu.studies import carry_out, sweep_costs
 from hovercraft_fmu.sweep import STUDIES, load, read_study, sweep
 from hovercraft_fmu.sweep import runner as runner_module
 from hovercraft_fmu.sweep.charts import plot_sweep
+from hovercraft_fmu.sweep.engines import Plan
 from hovercraft_fmu.sweep.quantities import DERIVED, OBSERVED
 from hovercraft_fmu.sweep.study import Factor
 from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
