@@ -141,7 +141,7 @@ class _Batch:
 
     def _observed(self, controls: Controls) -> dict[str, Any]:
         """As model/observation.py has it."""
-        surge, sway, force_x, force_y, moment = observe_fleet(self._states, controls, self._crafts)
+        surge, sway, force_x, force_y, moment, _ = observe_fleet(self._states, controls, self._crafts)
         vx, vy = self._states[3:5]
         mass, inertia = self._parameters["mass"], self._parameters["inertia"]
         thrust, port, starboard = self._saturated(controls)
