@@ -26,6 +26,7 @@ from hovercraft_fmu.fmu.native_package import build_native_fmu
 from hovercraft_fmu.fmu.python_package import build_fmu
 from hovercraft_fmu.fmu.start_values import Value, variant
 from hovercraft_fmu.host import Instance, SimulationError, read_description
+from hovercraft_fmu.model.craft import PRESETS
 from hovercraft_fmu.simulation import simulate
 from tests import binaries
 from tests.conftest import HERE
@@ -37,6 +38,7 @@ NAME = "HovercraftIce"
 OWN: dict[str, Value] = {"integrator": "rk4", "step_size": 0.1}
 STARTS = {"air_density": 0.0023769, "step_size": 0.1, "integrator": 3}
 """What the preset `ice` and OWN come to."""
+ICE = PRESETS["ice"]
 WORDS = "air_density = 0.0023769 kg/m3, step_size = 0.1 s, integrator = rk4"
 
 
@@ -69,6 +71,27 @@ def test_it_has_the_bits_of_simulate_with_the_same_settings(ice: Path, each_fmu:
     for name in expected.names:
         assert np.array_equal(found[name], expected[name]), name
     assert abs(found["velocity.yaw_rate"]).max() > 0.01  # it turned
+
+
+def test_this_package_runs_it_as_it_is(ice: Path, each_fmu: Path) -> None:
+    """What is not set is the variant's, in the run, its title and its pictures; what is set comes first."""
+    expected = simulate("turn", each_fmu, preset="ice", start_values=OWN, stop_time=20.0)
+    found = simulate("turn", ice, stop_time=20.0)
+    assert np.array_equal(found.data, expected.data)
+    assert (found.run.method, found.run.craft) == (expected.run.method, expected.run.craft) == ("rk4, 0.1 s", ICE)
+    others: dict[str, Value] = {"integrator": "semi_implicit_euler", "step_size": 0.01}
+    textbook = simulate("turn", ice, preset="textbook", start_values=others, stop_time=20.0)
+    usual = simulate("turn", each_fmu, start_values=others, stop_time=20.0)
+    assert np.array_equal(textbook.data, usual.data)
+    assert textbook.run.craft == usual.run.craft == PRESETS["textbook"]
+
+
+def test_an_input_that_nothing_is_said_of_holds_its_start_value(tmp_path: Path, each_fmu: Path, flavour: str) -> None:
+    windy = built(variant(FLAVOURS[flavour], "Windy", {"wind.y": 0.25}), tmp_path / "Windy.fmu")
+    table = np.array([(0.0, 5.0), (5.0, 5.0)], dtype=[("time", float), ("thrust", float)])
+    found, expected = simulate(table, windy), simulate(table, each_fmu, start_values={"wind.y": 0.25})
+    assert np.array_equal(found.data, expected.data)
+    assert found["wind.y"].min() == 0.25
 
 
 @pytest.mark.parametrize("host", hosts.HOSTS)

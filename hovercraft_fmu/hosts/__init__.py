@@ -122,7 +122,8 @@ def rows_of_module(module: str, *arguments: str, cwd: Path | None = None) -> lis
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, timeout=300)
     if done.returncode != 0:
         raise HostError(f"exit status {done.returncode}: {done.stderr.strip()[-500:]}")
-    rows: list[list[float]] = json.loads(done.stdout.splitlines()[-1])
+    # Ecos, in C, leaves a line of its own behind it now and then
+    rows: list[list[float]] = json.loads(next(x for x in reversed(done.stdout.splitlines()) if x.startswith("[[")))
     return rows
 
 

@@ -4,13 +4,14 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import isclose
+from typing import Any
 
 import fmpy
 import numpy as np
 
 from ..building import default_fmu
-from ..fmu.interface import HOVERCRAFT, INPUTS
-from ..fmu.start_values import Value
+from ..fmu.interface import BY_NAME, HOVERCRAFT, INPUTS
+from ..fmu.start_values import Value, start_value
 from ..host import Fmu, Instance, SimulationError
 from ..model.dynamics import Controls
 from .planning import Inputs, Progress, Run, plan
@@ -56,6 +57,7 @@ def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = N
         return True
 
     with Fmu(fmu, HOVERCRAFT.name) as opened, opened.instance() as craft, craft.driven_by_fmpy():
+        run = run.on(own_starts(opened.description))
         shown = [v.name for v in opened.description.modelVariables if v.causality in ("input", "output", "local")]
         data = fmpy.simulate_fmu(
             opened.folder,
@@ -123,4 +125,11 @@ class Stepper:
 def stepping(run: Run, fmu: str | os.PathLike[str]) -> Iterator[Stepper]:
     """An FMU to step by hand, not yet started. Raises as `simulate` does."""
     with Fmu(fmu, HOVERCRAFT.name) as opened, opened.instance() as craft:
-        yield Stepper(craft, run)
+        yield Stepper(craft, run.on(own_starts(opened.description)))
+
+
+def own_starts(description: Any) -> dict[str, float | int]:
+    """The start values of an FMU of the hovercraft that are its own, from fmpy's description."""
+    given = {v.name: v.start for v in description.modelVariables if v.start is not None and v.name in BY_NAME}
+    starts = {name: start_value(name, start) for name, start in given.items() if BY_NAME[name].start is not None}
+    return {name: start for name, start in starts.items() if start != BY_NAME[name].start}

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any, TypeAlias, cast
@@ -12,7 +12,7 @@ import numpy as np
 from ..fmu.interface import BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
 from ..fmu.start_values import Value
 from ..fmu.start_values import start_values as numbers
-from ..model.craft import Craft, preset
+from ..model.craft import PRESETS, Craft, preset
 from ..model.dynamics import State
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
@@ -24,6 +24,10 @@ Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
 Progress: TypeAlias = Callable[[float], None]
 """Called with the time [s] reached, after every communication step."""
 
+PRESET_PARAMETERS = tuple(
+    name for name in CRAFT_PARAMETERS if len({getattr(craft, name) for craft in PRESETS.values()}) > 1
+)
+"""In which presets differ."""
 MAX_STEPS = 10**8
 """Communication steps of a run: a year at 0.3 s, or a slip of the decimal point."""
 
@@ -46,6 +50,17 @@ class Run:
     """s"""
     communication_step: float
     """s"""
+    own: Mapping[str, float | int] = field(default_factory=dict)
+    """Start values that the FMU has of its own."""
+    held: tuple[str, ...] = ()
+    """Inputs that hold their start value: nothing was said of them."""
+
+    def on(self, own: Mapping[str, float | int]) -> "Run":
+        """The same on an FMU with start values of its own: they hold where the run sets nothing else."""
+        table = self.signals.copy()
+        for name in self.held:
+            table[name] = own.get(name, table[name])
+        return replace(self, own=own, signals=table)
 
     @property
     def craft(self) -> Craft:
@@ -72,7 +87,7 @@ class Run:
 
     def value(self, name: str) -> float | int:
         """The start value of a variable."""
-        default = BY_NAME[name].start
+        default = self.own.get(name, BY_NAME[name].start)
         return self.start_values.get(name, 0.0 if default is None else default)
 
 
@@ -111,6 +126,7 @@ def plan(
         start_time=first if start_time is None else start_time,
         stop_time=last if stop_time is None else stop_time,
         communication_step=default_step if communication_step is None else communication_step,
+        held=tuple(name for name in INPUTS if name not in (table.dtype.names or ()) and name not in values),
     )
     _check_times(run)
     return run
@@ -146,13 +162,16 @@ def _completed(table: Signals, values: Mapping[str, float | int]) -> Signals:
 
 
 def _scene_values(chosen: Scene | None, preset_name: str | None) -> dict[str, float | int]:
-    """What a scene and a preset set, by FMU names; only what differs from the FMU's own start values."""
+    """What a scene and a preset set, by FMU names; only what differs from the usual start values. Of a preset that was
+    asked for also what is usual but not in every preset: the FMU may have been made of another one.
+    """
     craft = preset(preset_name or (chosen.preset if chosen else "textbook"))
     values: dict[str, float | int] = {name: getattr(craft, name) for name in CRAFT_PARAMETERS}
     if chosen:
         values |= chosen.parameters
         values |= dict(zip(STATES, chosen.start, strict=True))
-    return {name: value for name, value in values.items() if value != BY_NAME[name].start}
+    asked = {name for name in values if preset_name and name in PRESET_PARAMETERS}
+    return {name: value for name, value in values.items() if name in asked or value != BY_NAME[name].start}
 
 
 def _check_times(run: Run) -> None:

@@ -11,7 +11,7 @@ import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -27,6 +27,7 @@ from .._version import __version__
 from ..building import default_fmu
 from ..fmu.interface import HOVERCRAFT
 from ..host import SimulationError, read_description
+from ..simulation.fmu_run import own_starts
 from .batch import run_batch
 from .engines import SETTINGS, Driver, Plan
 from .quantities import quantity_function, row_columns
@@ -166,7 +167,8 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
                 f"fmu = {str(fmu)!r}: must not be given with the engine batch, which is the compiled kernel"
             )
     else:
-        content = _content(study, Path(fmu or default_fmu()))
+        content, own = _content(study, Path(fmu or default_fmu()))
+        study = replace(study, run=study.run.on(own))
     swept = tuple(factor.name for factor in study.factors)
     plan = Plan(study.run, study.keep, timeline(study.run, study.keep))
     about = {
@@ -198,13 +200,14 @@ def _chunk(plan: Plan, runs: int, engine: str) -> int:
     return max(1, most)
 
 
-def _content(study: Study, path: Path) -> bytes:
-    """The FMU as it is now, checked."""
-    has = {variable.name for variable in read_description(path, model=HOVERCRAFT.name).modelVariables}
+def _content(study: Study, path: Path) -> tuple[bytes, dict[str, float | int]]:
+    """The FMU as it is now, checked, and the start values that are its own."""
+    description = read_description(path, model=HOVERCRAFT.name)
+    has = {variable.name for variable in description.modelVariables}
     for name in (*study.run.start_values, *(factor.name for factor in study.factors), *study.keep.read, *SETTINGS):
         if name not in has:
             raise ValueError(f"{path}: must have the variable {name}")
-    return path.read_bytes()
+    return path.read_bytes(), own_starts(description)
 
 
 # ---- on a worker
