@@ -30,7 +30,7 @@ def write_cross_check(folder: Path) -> list[Path]:
     """Write the files of the native FMU for every platform into a vendor's repository; return their folders.
 
     Raises:
-        ModuleNotFoundError: the compiler of the native FMU is not installed.
+        NotCompiledError: there is no machine code; the message says how to get it.
         OSError: a file cannot be written.
     """
     name, chosen = NATIVE.identifier, scene(SCENE)

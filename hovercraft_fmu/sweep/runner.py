@@ -109,7 +109,7 @@ def sweep(
 
     Args:
         study: see `read_study`.
-        fmu: the file; without it build/Hovercraft.fmu, which is built if it is not there.
+        fmu: the file; without it the native FMU in build/, which is built if it is not there.
         engine: fmu, or batch: the compiled kernel, all craft at once, with the bits of the native FMU.
         workers: processes on this machine; by default one a processor. 1: this process.
         scheduler: address of a dask.distributed scheduler, as tcp://10.0.0.1:8786, whose workers have this package.
