@@ -172,6 +172,8 @@ def test_what_is_wrong_is_one_clear_line(shell: Shell, arguments: tuple[str, ...
 HIDDEN = {
     "matplotlib": (("simulate", "--stop-time", "1", "--plot", "a.png"), "[plot]"),
     "matplotlib of an animation": (("simulate", "--stop-time", "1", "--animate", "a.gif"), "[plot]"),
+    "matplotlib of a study": (("measure", "stability"), "[studies]"),
+    "matplotlib of the demo": (("demo",), "[plot]"),
     "plotly": (("simulate", "--stop-time", "1", "--animate", "a.html"), "[html]"),
     "pyarrow": (("sweep", "turning_circle"), "[sweep]"),
     "polars": (("measure", "coupling"), "[studies]"),

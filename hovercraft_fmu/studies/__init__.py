@@ -44,6 +44,8 @@ def carry_out(name: str, quick: bool, folder: Path, tell: Callable[[float], None
     if name not in STUDIES:
         raise ValueError(f"study = {name!r}: must be one of {', '.join(STUDIES)}")
     try:
+        for package in NEEDED:  # what draws is imported late: it is to be missed before the work
+            importlib.import_module(package)
         module = importlib.import_module(f".{STUDIES[name].module}", __name__)
     except ModuleNotFoundError as error:
         if not (error.name or "").startswith(NEEDED):
