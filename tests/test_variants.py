@@ -31,6 +31,7 @@ from hovercraft_fmu.simulation import simulate
 from tests import binaries
 from tests.conftest import HERE
 from tests.lowlevel import count, everything, get, one, put, reference, start
+from tests.masters import loop_in
 from tests.native import compile_c
 
 FLAVOURS = {"python": PYTHON, "native": NATIVE, "native3": NATIVE3}
@@ -233,6 +234,21 @@ def test_built_from_its_sources_it_is_the_same(ice: Path, flavour: str, tmp_path
         start(instance)
         instance.doStep(0.0, 0.5)
         assert everything(instance) == expected
+
+
+def test_a_loop_with_it_sails_with_its_start_values(native_fmu: Path, autopilot: Path, tmp_path: Path) -> None:
+    if missing := hosts.HOSTS["libcosimpy"].missing():
+        pytest.skip(f"libcosimpy: {missing}")
+    coarse = built(variant(NATIVE, "Coarse", OWN), tmp_path / "Coarse.fmu")
+    folders = [tmp_path / name for name in ("ssp", "functions", "usual")]
+    for folder in folders:
+        folder.mkdir()
+    found = loop_in("libcosimpy, SSP", coarse, autopilot, folders[0])
+    assert found == loop_in("libcosimpy, functions", coarse, autopilot, folders[1])
+    assert found != loop_in("libcosimpy, functions", native_fmu, autopilot, folders[2])
+    with zipfile.ZipFile(build("python_loop", tmp_path / "X.ssp", name="X", start_values=OWN)) as archive:
+        assert {"resources/X.fmu", "resources/Autopilot.fmu"} <= set(archive.namelist())
+        assert b'source="resources/X.fmu"' in archive.read("SystemStructure.ssd")
 
 
 # ---- the block in a library
