@@ -7,7 +7,6 @@ from ._version import __version__
 
 if TYPE_CHECKING:
     from .building import build
-    from .fmu.python_package import build_fmu
     from .host import SimulationError
     from .host.fleet import Crafts, advance_fleet
     from .simulation import Result, simulate
@@ -18,12 +17,11 @@ _HOMES = {
     "SimulationError": "host",
     "advance_fleet": "host.fleet",
     "build": "building",
-    "build_fmu": "fmu.python_package",
     "simulate": "simulation",
 }
 """Where each name is from: a module is loaded when something of it is asked for, as most take others with them."""
 
-__all__ = ["Crafts", "Result", "SimulationError", "__version__", "advance_fleet", "build", "build_fmu", "simulate"]
+__all__ = ["Crafts", "Result", "SimulationError", "__version__", "advance_fleet", "build", "simulate"]
 
 
 def __getattr__(name: str) -> Any:

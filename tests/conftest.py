@@ -12,11 +12,12 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-from hovercraft_fmu import advance_fleet, build_fmu
+from hovercraft_fmu import advance_fleet
 from hovercraft_fmu.autopilot.pilot_package import build_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all
 from hovercraft_fmu.fmu.native_package import build_native_fmu
+from hovercraft_fmu.fmu.python_package import build_fmu
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from tests.lowlevel import one

@@ -10,11 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from hovercraft_fmu import build_fmu
 from hovercraft_fmu.fmu.machine_code import LEAVE_OUT
+from hovercraft_fmu.fmu.python_package import build_fmu
 from tests.conftest import FMI_2, ROOT, Fresh
 
-BUILD = "import sys, os; os.umask(int(sys.argv[1], 8)); import hovercraft_fmu as h; print(h.build_fmu(), h.__file__)"
+BUILD = (
+    "import sys, os; os.umask(int(sys.argv[1], 8)); import hovercraft_fmu as h; print(h.build('python'), h.__file__)"
+)
 
 BUILD_NATIVE = "import hovercraft_fmu as h; h.build()"
 
@@ -98,9 +100,9 @@ def test_a_build_leaves_the_process_as_it_was(tmp_path: Path) -> None:
 def test_build_run_and_build_again_in_one_process(fresh: Fresh) -> None:
     code = """
 import hovercraft_fmu as h
-one = h.build_fmu("One.fmu").read_bytes()
+one = h.build("python", "One.fmu").read_bytes()
 first = h.simulate("turn", "One.fmu")
-assert h.build_fmu("Two.fmu").read_bytes() == one
+assert h.build("python", "Two.fmu").read_bytes() == one
 assert (h.simulate("turn", "Two.fmu").data == first.data).all()
 print("ok")
 """

@@ -12,11 +12,11 @@ from types import ModuleType
 import fmpy
 import pytest
 
-from hovercraft_fmu import build_fmu
 from hovercraft_fmu.fmu import document, machine_code, python_package
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.machine_code import identity
 from hovercraft_fmu.fmu.native_package import build_native_fmu
+from hovercraft_fmu.fmu.python_package import build_fmu
 from tests.conftest import HERE
 from tests.lowlevel import everything, one, put, start
 
