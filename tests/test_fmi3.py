@@ -419,7 +419,13 @@ def test_what_is_logged(slave: fmi3.FMU3Slave) -> None:
         assert told() == [ERROR]
         slave.setDebugLogging(True, [])
         assert told() == [WARNING, ERROR]
-        slave.setDebugLogging(True, ["logStatusError"])
+        slave.setDebugLogging(False, [])
+        assert told() == []
+        slave.setDebugLogging(True, ["logStatusError"])  # 2.3.1: the second call adds to what is on
+        assert told() == [ERROR]
+        slave.setDebugLogging(True, ["logStatusWarning"])
+        assert told() == [WARNING, ERROR]
+        slave.setDebugLogging(False, ["logStatusWarning"])
         assert told() == [ERROR]
         slave.setDebugLogging(False, [])
         assert told() == []

@@ -105,7 +105,8 @@ DOOR enum verdict instance_reset(struct instance *instance);
 
 /* Say something, and return the verdict. For `format` see text.h. */
 DOOR enum verdict instance_say(struct instance *instance, enum verdict verdict, const char *format, ...);
-/* Switched on, only these categories are told; switched off, these no more. Without categories it is all of them. */
+/* Switched on, these categories are told, in FMI 2.0 only these, in FMI 3.0 these too; switched off, these no more.
+   Without categories it is all of them. */
 DOOR enum verdict instance_log(struct instance *instance, bool on, size_t n, const char *const *categories);
 
 /* ---- instance.c: the life cycle. `stop_time` is infinite where there is none. */

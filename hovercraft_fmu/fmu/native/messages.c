@@ -39,7 +39,8 @@ enum verdict instance_log(struct instance *instance, bool on, size_t n, const ch
         warnings = warnings || all || warning;
         errors = errors || all || error;
     }
-    instance->warnings = on ? warnings : instance->warnings && !warnings;
-    instance->errors = on ? errors : instance->errors && !errors;
+    const bool kept = !on || instance->services.fmi == 3; /* FMI 2.0: "only", FMI 3.0: these too */
+    instance->warnings = on ? warnings || (kept && instance->warnings) : instance->warnings && !warnings;
+    instance->errors = on ? errors || (kept && instance->errors) : instance->errors && !errors;
     return FINE;
 }
