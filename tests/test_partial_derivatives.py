@@ -128,14 +128,14 @@ def test_partial_derivatives_are_those_of_the_model(
 @settings(max_examples=100)
 @given(craft=st.one_of(crafts, rubbing_crafts), state=rounded_states, held=rounded_controls)
 def test_partial_derivatives_in_co_simulation(craft: Craft, state: State, held: Controls, stepped: Any) -> None:
-    """At a communication point: of what is read there, so with the inputs of the step that led to it."""
+    """At a communication point, with the inputs that are set there: those of the step to come."""
     state = state._replace(vx=state.vx or 0.5)
     stepped.reset()
     put_craft(stepped, craft)
     values = {name.replace(".", "__"): value for name, value in zip(KNOWNS, (*state, *held), strict=True)}
     start(stepped, **values)
-    put(stepped, thrust=3.0, port_thruster=0.25)  # for the next step
-    assert_close(jacobian(stepped), by_complex_steps(state, held, craft))
+    put(stepped, thrust=3.0, port_thruster=0.25)
+    assert_close(jacobian(stepped), by_complex_steps(state, held._replace(thrust=3.0, port=0.25), craft))
 
 
 def initialize(instance: Any, state: State, held: Controls, craft: Craft) -> None:
@@ -205,7 +205,7 @@ def test_partial_derivatives_after_a_step(stepped: Any) -> None:
     put(stepped, thrust=7.0, port_thruster=0.5, wind__x=0.3)
     stepped.doStep(0.0, 2.0)
     put(stepped, thrust=-20.0, wind__x=0.0)
-    held = Controls(7.0, 0.5, 0.0, 0.3)
+    held = Controls(-20.0, 0.5, 0.0, 0.0)
     expected = by_complex_steps(State(*get(stepped, *STATES)), held, Craft(thrust_min=-10.0))
     assert_close(jacobian(stepped), expected)
 

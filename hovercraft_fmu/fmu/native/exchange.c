@@ -44,8 +44,11 @@ enum verdict instance_complete_integrator_step(struct instance *instance, bool *
 
 enum verdict instance_set_time(struct instance *instance, double time)
 {
+    const double start_time = instance->now.start_time;
     if (!isfinite(time))
         return instance_say(instance, REFUSED, "time = %r s: must be a finite number", time);
+    if (start_time - time > SAME_TIME * larger(1.0, fabs(start_time)))
+        return instance_say(instance, REFUSED, "time = %r s: must not be before startTime = %r s", time, start_time);
     instance->now.time = time;
     return FINE;
 }

@@ -59,7 +59,7 @@ enum verdict instance_set_up(struct instance *instance, double start_time, bool 
     if (!(stop_time >= start_time))
         return instance_say(instance, REFUSED, "stopTime = %r s: must not be before startTime = %r s", stop_time,
                             start_time);
-    instance->now.time = start_time;
+    instance->now.time = instance->now.start_time = start_time;
     instance->now.stop_time = stop_time;
     instance->now.hosts_tolerance = tolerance_given ? tolerance : 0.0;
     return FINE;
@@ -142,8 +142,9 @@ static enum verdict take_up_start_values(struct instance *instance)
         .integrator = integrator,
         .tolerance = now->hosts_tolerance > 0.0 ? now->hosts_tolerance : now->reals[V_TOLERANCE],
     };
-    instance_copy(&now->controls, now->reals, INPUTS, INPUT_COUNT);
+    instance_copy(&now->inputs, now->reals, INPUTS, INPUT_COUNT);
     instance_copy(&now->state, now->reals, STATES, STATE_COUNT);
+    now->controls = now->inputs;
     now->reals[V_PROJECTED_AREA] = kernel_derived(&craft).projected_area;
     now->tuned = false;
     now->motion_unread = now->action_unread = true;
@@ -162,7 +163,7 @@ enum verdict instance_take_up(struct instance *instance)
         return REFUSED;
     now->craft = craft;
     now->tuned = false;
-    instance_copy(&now->controls, now->reals, INPUTS, INPUT_COUNT);
+    now->controls = now->inputs;
     return FINE;
 }
 

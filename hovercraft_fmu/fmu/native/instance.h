@@ -41,10 +41,13 @@ struct content {
     enum use use;                     /* as it was started; a reset keeps it */
     enum phase phase;
     double time;                      /* s, where the last step ended; in model exchange as the solver sets it */
+    double start_time;                /* s, given with the experiment */
     double stop_time;                 /* s, given with the experiment; else infinite */
     double reals[VARIABLE_COUNT];     /* what is read, by value reference */
     int32_t integers[VARIABLE_COUNT];
+    struct controls inputs;           /* where the next step begins: as the host set them, and as ramps led on */
     double rates[INPUT_COUNT];        /* per s, of the inputs */
+    int32_t rated;                    /* bit i: that of input i was set at this communication point */
     double hosts_tolerance;           /* given with the experiment, it comes before the parameter; else 0 */
     struct state state;
     struct controls controls;         /* at the end of the last step, before saturation; in model exchange now */
@@ -186,12 +189,12 @@ DOOR enum verdict instance_get_nominals(struct instance *instance, double *value
 /* There are none. */
 DOOR enum verdict instance_get_event_indicators(struct instance *instance, size_t n);
 
-/* ---- partials.c: the partial derivatives, for either use, from initialization mode on, where what is read stands: in
-   co-simulation with the controls of the last step. In initialization mode of what is calculated then (ROWS), with
-   respect to inputs, states and real parameters; later of outputs and of the states' derivatives, with respect to
-   states and inputs. Refused: an unknown or a known that is none of these, what is no finite number, accelerations of a
-   craft at rest on ground that rubs. A value for each unknown: the sum over the knowns of seed * d(unknown)/d(known);
-   the adjoint ones: for each known, over the unknowns. */
+/* ---- partials.c: the partial derivatives, for either use, from initialization mode on, where what is read stands,
+   with the inputs and the parameters that are set: in step mode those of the step to come. In initialization mode of
+   what is calculated then (ROWS), with respect to inputs, states and real parameters; later of outputs and of the
+   states' derivatives, with respect to states and inputs. Refused: an unknown or a known that is none of these, what
+   is no finite number, accelerations of a craft at rest on ground that rubs. A value for each unknown: the sum over
+   the knowns of seed * d(unknown)/d(known); the adjoint ones: for each known, over the unknowns. */
 DOOR enum verdict instance_directional_derivatives(struct instance *instance, const unsigned *unknowns,
                                                    size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
                                                    const double *seeds, double *values);

@@ -64,10 +64,9 @@ static bool is_accelerated(const unsigned *unknowns, size_t n_unknowns)
     return false;
 }
 
-static bool is_stuck(const struct content *content)
+static bool is_stuck(const struct state *s, const struct craft *craft)
 {
-    const struct state *s = &content->state;
-    return content->craft.skirt_friction != 0.0 && s->vx == 0.0 && s->vy == 0.0 && s->yaw_rate == 0.0;
+    return craft->skirt_friction != 0.0 && s->vx == 0.0 && s->vy == 0.0 && s->yaw_rate == 0.0;
 }
 
 /* d(unknown)/d(known), of references that were not refused. */
@@ -84,13 +83,19 @@ static enum verdict linearize(struct instance *instance, enum call call, const u
                               const unsigned *knowns, size_t n_knowns, struct linearization *linearization)
 {
     const struct content *now = &instance->now;
+    struct craft craft;
     if (check_references(instance, call, unknowns, n_unknowns, knowns, n_knowns) == REFUSED ||
         instance_get_reals(instance, NULL, 0, NULL) == REFUSED) /* all is up to date after that */
         return REFUSED;
-    if (is_stuck(now) && is_accelerated(unknowns, n_unknowns))
+    const bool to_come = now->phase == STEPPING; /* a controller asks at a point what an input would do from there */
+    craft = now->craft;
+    if (to_come && now->tuned && instance_make_craft(instance, &craft) == REFUSED)
+        return REFUSED;
+    if (is_stuck(&now->state, &craft) && is_accelerated(unknowns, n_unknowns))
         return instance_say(instance, REFUSED, "%s: the craft is at rest on ground that rubs: it must slide to have "
                                                "partial derivatives", call_name(instance, call));
-    kernel_linearize(&now->state, &now->controls, &now->craft, now->phase == INITIALIZING, linearization);
+    kernel_linearize(&now->state, to_come ? &now->inputs : &now->controls, &craft, now->phase == INITIALIZING,
+                     linearization);
     for (size_t i = 0; i < n_unknowns; i++)
         for (size_t k = 0; k < n_knowns; k++) {
             const double value = partial(linearization, unknowns[i], knowns[k]);

@@ -4,9 +4,10 @@
 
 #include "root.h"
 
-static enum verdict check_order(struct instance *instance, unsigned reference, int order)
+/* Derivatives of a higher order are there where they are 0. */
+static enum verdict check_order(struct instance *instance, unsigned reference, int order, double value)
 {
-    if (order == 1)
+    if (order == 1 || (order > 1 && value == 0.0))
         return FINE;
     return instance_say(instance, REFUSED, "order = %i of the derivative of %s: must be 1", (long long)order,
                         VARIABLES[reference].name);
@@ -21,14 +22,19 @@ enum verdict instance_set_rates(struct instance *instance, const unsigned *refer
                                 (unsigned long long)references[i]);
         const struct variable *variable = &VARIABLES[references[i]];
         if (instance_check_settable(instance, variable, values[i]) == REFUSED ||
-            check_order(instance, references[i], orders[i]) == REFUSED)
+            check_order(instance, references[i], orders[i], values[i]) == REFUSED)
             return REFUSED;
         if (!isfinite(values[i]))
             return instance_say(instance, REFUSED, "derivative of %s = %r: must be a finite number", variable->name,
                                 values[i]);
     }
-    for (size_t i = 0; i < n; i++)
-        instance->now.rates[instance_place(INPUTS, INPUT_COUNT, references[i])] = values[i];
+    for (size_t i = 0; i < n; i++) {
+        const unsigned input = instance_place(INPUTS, INPUT_COUNT, references[i]);
+        if (orders[i] == 1) {
+            instance->now.rates[input] = values[i];
+            instance->now.rated |= 1 << input;
+        }
+    }
     return FINE;
 }
 
@@ -85,14 +91,17 @@ enum verdict instance_get_rates(struct instance *instance, const unsigned *refer
             return instance_say(instance, REFUSED,
                                 "value reference %u: must be that of an output to have a derivative",
                                 (unsigned long long)references[i]);
-        if (check_order(instance, references[i], orders[i]) == REFUSED)
+        if (check_order(instance, references[i], orders[i], 0.0) == REFUSED)
             return REFUSED;
         if (!isfinite(rate))
             return instance_say(instance, REFUSED,
                                 "derivative of %s = %r: must be a finite number; the motion is out of range",
                                 VARIABLES[references[i]].name, rate);
     }
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
         output_rate(instance->now.reals, references[i], &values[i]);
+        if (orders[i] > 1)
+            values[i] = 0.0;
+    }
     return FINE;
 }

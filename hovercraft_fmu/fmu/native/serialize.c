@@ -11,7 +11,7 @@
 #include "instance.h"
 #include "variant.h"
 
-enum { VERSION = 4, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
+enum { VERSION = 5, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
 static const char MAGIC[] = "HOVERFMU";
 
 enum direction { MEASURE, WRITE, READ };
@@ -94,14 +94,17 @@ static void exchange(struct cursor *cursor, struct content *c)
     exchange_integer(cursor, &use);
     exchange_integer(cursor, &phase);
     exchange_integer(cursor, &tuned);
+    exchange_integer(cursor, &c->rated);
     exchange_integer(cursor, &c->settings.integrator);
     exchange_double(cursor, &c->settings.step_size);
     exchange_double(cursor, &c->settings.tolerance);
     exchange_double(cursor, &c->time);
+    exchange_double(cursor, &c->start_time);
     exchange_double(cursor, &c->stop_time);
     for (unsigned i = 0; i < VARIABLE_COUNT; i++)
         if (VARIABLES[i].start_given && VARIABLES[i].kind == REAL && !is_state(i))
             exchange_double(cursor, &c->reals[i]);
+    exchange_doubles(cursor, &c->inputs, sizeof c->inputs);
     exchange_doubles(cursor, c->rates, sizeof c->rates);
     exchange_double(cursor, &c->hosts_tolerance);
     exchange_state(cursor, c);

@@ -161,7 +161,7 @@ static enum verdict make_drive(struct instance *instance, double step, struct dr
     const double *rates = instance->now.rates;
     double ends[INPUT_COUNT];
     bool finite = true;
-    instance_copy(&drive->start, instance->now.reals, INPUTS, INPUT_COUNT);
+    drive->start = instance->now.inputs;
     memcpy(&drive->rate, rates, sizeof drive->rate);
     drive->ramped = false;
     for (unsigned i = 0; i < INPUT_COUNT; i++)
@@ -204,7 +204,8 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->motion_unread = now->action_unread = true;
     now->stability = larger(now->stability, stability);
     now->rotation = larger(now->rotation, stretch.rotation);
-    instance_spread(now->reals, &end, INPUTS, INPUT_COUNT); /* a ramp goes on from here */
+    now->inputs = end; /* a ramp goes on from here */
+    now->rated = 0;
     enum verdict verdict = count_substeps(instance, stretch.substeps);
     verdict = worse(verdict, warn_of_the_step(instance));
     verdict = worse(verdict, instance_warn_of_held_inputs(instance, &drive.start));

@@ -1,6 +1,7 @@
 #include "instance.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "root.h"
 
@@ -141,9 +142,14 @@ static const char *broken_rule(enum rule rule, double value)
     return NULL;
 }
 
+/* A state is set in model exchange as SetContinuousStates does it: in FMI 3.0 in event mode too. */
 static bool is_settable(const struct instance *instance, const struct variable *variable)
 {
-    return variable->settable >> instance->now.phase & 1u;
+    const enum phase phase = instance->now.phase;
+    const bool solved = phase == CONTINUOUS_TIME || (phase == EVENT_MODE && instance->services.fmi == 3);
+    const unsigned reference = (unsigned)(variable - VARIABLES);
+    return variable->settable >> phase & 1u ||
+           (solved && instance_place(STATES, STATE_COUNT, reference) < STATE_COUNT);
 }
 
 enum verdict instance_check_settable(struct instance *instance, const struct variable *variable, double value)
@@ -188,6 +194,14 @@ unsigned instance_place(const unsigned *references, unsigned n, unsigned referen
     return i;
 }
 
+/* A ramp of before ends; one that was set at this communication point stays, so that the order does not matter. */
+static void set_input(struct content *now, unsigned input, double value)
+{
+    memcpy((char *)&now->inputs + input * sizeof(double), &value, sizeof(double));
+    if (!(now->rated >> input & 1))
+        now->rates[input] = 0.0;
+}
+
 enum verdict instance_set_reals(struct instance *instance, const unsigned *references, size_t n, const double *values)
 {
     bool parameter = false;
@@ -199,9 +213,12 @@ enum verdict instance_set_reals(struct instance *instance, const unsigned *refer
     }
     for (size_t i = 0; i < n; i++) {
         const unsigned input = instance_place(INPUTS, INPUT_COUNT, references[i]);
+        const unsigned state = instance_place(STATES, STATE_COUNT, references[i]);
         instance->now.reals[references[i]] = values[i];
         if (input < INPUT_COUNT)
-            instance->now.rates[input] = 0.0;
+            set_input(&instance->now, input, values[i]);
+        else if (state < STATE_COUNT)
+            memcpy((char *)&instance->now.state + state * sizeof(double), &values[i], sizeof(double));
         else
             parameter = true;
     }
