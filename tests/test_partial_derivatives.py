@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hovercraft_fmu.fmu.interface import INPUTS, STATES
+from hovercraft_fmu.fmu.interface import BY_NAME, DERIVATIVES, INPUTS, STATES
 from hovercraft_fmu.host import read_description
 from hovercraft_fmu.model import dynamics
 from hovercraft_fmu.model.craft import Craft
@@ -322,9 +322,48 @@ def test_dependencies_are_where_partial_derivatives_are_not_zero(use: str, descr
         instance.setReal([reference(name) for name in INPUTS], [5.0, 0.5, 0.5, *dice.normal(size=2)])
         acts |= jacobian(instance) != 0.0
     for unknown in getattr(description, use):
-        listed = {variable.name for variable in unknown.dependencies}
+        listed = {variable.name for variable in unknown.dependencies} - set(TUNABLE)
         row = UNKNOWNS.index(unknown.variable.name)
         assert listed == {name for name, each in zip(KNOWNS, acts[row], strict=True) if each}, unknown.variable.name
+
+
+TUNABLE = tuple(name for name in PARAMETERS if BY_NAME[name].variability == "tunable")
+
+
+@pytest.mark.parametrize("standard", [3], indirect=True)
+def test_the_tunable_parameters_are_knowns_of_fmi_3(description: Any, instance: Any, stepped: Any) -> None:
+    """3.0, 2.2.12 and 2.4.8: in event mode and in step mode; their slopes are those of what is read, by central
+    differences (errors of h^2 and of rounding), and listed is what acts.
+    """
+    rows = [reference(name) for name in DERIVATIVES[3:]]
+    start(instance, wind__x=0.3, rotational_drag=0.5)
+    dice = np.random.default_rng(2)
+    acts: dict[str, set[str]] = {name: set() for name in DERIVATIVES}
+    for thrust in (5.0, 99.0, -99.0):
+        instance.setReal([reference(name) for name in STATES], dice.normal(size=6).tolist())
+        put(instance, thrust=thrust, port_thruster=0.8)
+        for known in TUNABLE:
+            slopes = instance.getDirectionalDerivative(rows, [reference(known)], [1.0])
+            acts = {
+                name: acts[name] | ({known} if slope else set())
+                for name, slope in zip(acts, [0.0] * 3 + slopes, strict=True)
+            }
+            if known == "skirt_friction":
+                continue  # cannot be anything but 0 here
+            (value,), ends = get(instance, known), []
+            for h in (-1e-5, 1e-5):
+                put(instance, **{known: value + h})
+                ends.append(np.array(get(instance, *DERIVATIVES[3:])))
+            put(instance, **{known: value})
+            assert slopes == pytest.approx(list((ends[1] - ends[0]) / 2e-5), rel=1e-6, abs=1e-8)
+    listed = {u.variable.name: {v.name for v in u.dependencies} & set(TUNABLE) for u in description.derivatives}
+    assert listed == acts
+    stepped.reset()
+    start(stepped, velocity__x=2.0)
+    stepped.doStep(0.0, 0.1)
+    assert partial(stepped, "acceleration.x", "drag_coefficient") < -0.1
+    with pytest.raises(FMICallException):
+        partial(stepped, "acceleration.x", "mass")
 
 
 def initially_read(instance: Any, values: dict[str, float], drag_area: int) -> list[float]:

@@ -293,10 +293,17 @@ def _place(name: str, flavour: Flavour) -> str:
     return str(model.index[name] if flavour.fmi == 2 else model.by_name[name].reference)
 
 
-def _followed(acceleration: str) -> tuple[str, ...]:
-    """The states and inputs that an acceleration follows; thrust has no moment."""
-    inputs = tuple(name for name in INPUTS if not (name == "thrust" and acceleration == "acceleration.yaw"))
-    return (*inputs, "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
+def _followed(acceleration: str, flavour: Flavour) -> tuple[str, ...]:
+    """The states and inputs that an acceleration follows, and in FMI 3.0 the tunable parameters; thrust has no moment,
+    rotational drag is one.
+    """
+    turns = acceleration == "acceleration.yaw"
+    tunable = [
+        v.name for v in flavour.model.variables if v.name in CRAFT_PARAMETERS and v.variability == "tunable"
+    ] if flavour.fmi == 3 else []  # fmt: skip
+    names = (*INPUTS, "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate", *tunable)
+    others = ("thrust", "thrust_min", "thrust_max") if turns else ("rotational_drag",)
+    return tuple(name for name in names if name not in others)
 
 
 def _followed_initially(acceleration: str) -> tuple[str, ...]:
@@ -320,7 +327,7 @@ def _structure(parent: Element, flavour: Flavour) -> None:
         for v in table
         if v.initial == "calculated" and v.causality in ("output", "calculatedParameter")
     }
-    derivatives = {name: (name,) if name in STATES else _followed(name) for name in DERIVATIVES}
+    derivatives = {name: (name,) if name in STATES else _followed(name, flavour) for name in DERIVATIVES}
     if not flavour.exchange:
         outputs, derivatives = dict.fromkeys(outputs, ()), {}
     calculated = {v.name for v in table if v.initial == "calculated"}

@@ -6,12 +6,16 @@
 _Static_assert(GIVEN_REAL_COUNT == INITIAL_KNOWN_COUNT + 2, "a parameter is a number of the craft, or of the steps");
 
 /* The standard's knowns: in initialization mode the inputs, and every Real that is given exactly: states, parameters;
-   later the inputs and the states. */
-static bool is_known(enum phase phase, unsigned reference)
+   later the inputs and the states, and in FMI 3.0, where they can be set, the tunable parameters. */
+static bool is_known(const struct instance *instance, unsigned reference)
 {
+    const enum phase phase = instance->now.phase;
     if (phase == INITIALIZING)
         return reference < VARIABLE_COUNT && VARIABLES[reference].kind == REAL && VARIABLES[reference].start_given;
-    return instance_place(KNOWNS, KNOWN_COUNT, reference) < KNOWN_COUNT;
+    const unsigned place = instance_place(KNOWNS, INITIAL_KNOWN_COUNT, reference);
+    if (place == INITIAL_KNOWN_COUNT)
+        return false;
+    return place < KNOWN_COUNT || (instance->services.fmi == 3 && VARIABLES[reference].settable >> phase & 1u);
 }
 
 /* And its unknowns: in initialization mode those that are calculated then; later states and their derivatives, and what
@@ -46,7 +50,7 @@ static enum verdict check_references(struct instance *instance, enum call call, 
                           initial ? "must be one of the initial unknowns in initialization mode"
                                   : "must be an output or the derivative of a state after initialization mode");
     for (size_t k = 0; k < n_knowns; k++)
-        if (!is_known(phase, knowns[k]))
+        if (!is_known(instance, knowns[k]))
             return refuse_reference(instance, call, knowns[k], "known",
                           initial ? "must be a state, an input or a real parameter in initialization mode"
                                   : "must be a state or an input after initialization mode");
@@ -94,8 +98,10 @@ static enum verdict linearize(struct instance *instance, enum call call, const u
     if (is_stuck(&now->state, &craft) && is_accelerated(unknowns, n_unknowns))
         return instance_say(instance, REFUSED, "%s: the craft is at rest on ground that rubs: it must slide to have "
                                                "partial derivatives", call_name(instance, call));
-    kernel_linearize(&now->state, to_come ? &now->inputs : &now->controls, &craft, now->phase == INITIALIZING,
-                     linearization);
+    bool parameters = now->phase == INITIALIZING;
+    for (size_t k = 0; k < n_knowns; k++)
+        parameters = parameters || instance_place(KNOWNS, KNOWN_COUNT, knowns[k]) == KNOWN_COUNT;
+    kernel_linearize(&now->state, to_come ? &now->inputs : &now->controls, &craft, parameters, linearization);
     for (size_t i = 0; i < n_unknowns; i++)
         for (size_t k = 0; k < n_knowns; k++) {
             const double value = partial(linearization, unknowns[i], knowns[k]);
