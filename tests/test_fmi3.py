@@ -154,8 +154,8 @@ BAD_LISTS: dict[str, tuple[Callable[[Any], object], str]] = {
         "drag_area = 9: must be one of",
     ),
     "order": (
-        lambda i: i.getOutputDerivatives([3], [2]),
-        "order = 2 of the derivative of pose.x: must be 1",
+        lambda i: i.getOutputDerivatives([3], [0]),
+        "order = 0 of the derivative of pose.x: must be 1",
     ),
     "no output": (
         lambda i: i.getOutputDerivatives([0], [1]),
