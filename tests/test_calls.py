@@ -1,7 +1,7 @@
 """What the standards ask of the calls, rule by rule; in brackets the sections of FMI 2.0.5 and FMI 3.0.2."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +95,7 @@ def test_the_order_of_an_input_and_its_derivative_does_not_matter(instance: Any)
         instance.reset()
         start(instance)
         instance.doStep(0.0, 0.5)
-        calls = [
+        calls: list[Callable[[], object]] = [
             lambda: put(instance, thrust=1.0),
             lambda: instance.setRealInputDerivatives([reference("thrust")], [1], [2.0]),
         ]

@@ -98,8 +98,8 @@ static inline void instance_come_back(struct instance *instance, bool inside)
         instance_enter(instance);
 }
 
-/* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. Refused: the library's
-   start values (variant.h) cannot be. */
+/* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. Refused: the
+   library's start values (variant.h) cannot be. */
 DOOR enum verdict instance_start(struct instance *instance, enum use use, const struct services *services,
                                  bool logging);
 DOOR enum verdict instance_reset(struct instance *instance);
