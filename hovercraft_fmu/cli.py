@@ -1,5 +1,9 @@
-"""The command hovercraft-fmu: a thin layer over the functions of the package."""
+"""The command hovercraft-fmu: a thin layer over the functions of the package.
 
+A command loads what it needs when it runs: `--help` is there at once.
+"""
+
+import math
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -7,10 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -26,36 +29,25 @@ from rich.table import Table
 from rich.text import Text
 
 from ._version import __version__
-from .building import (
-    FOLDER,
-    PRODUCTS,
-    Kind,
-    Product,
-    build,
-    default_fmu,
-    default_kind,
-    product,
-    variant_product,
-)
-from .coupling import Passage, sail
-from .fmu.machine_code import NotCompiledError
-from .host import SimulationError
 from .model.craft import PRESETS
-from .scenes import CONTROL_LOGS, SCENES, VOYAGES
-from .simulation import Inputs, Result, Run, plan, run_fmu
 from .studies import STUDIES, carry_out
-from .validation import Check, validate, validate_elsewhere
 from .view.operator import PRESET, TIME_SCALE
 from .view.tables import markdown
 
-DEMO_FOLDER = Path("build") / "demo"
-DEMO_LOG = CONTROL_LOGS / "ice.csv"
+if TYPE_CHECKING:
+    from .building import Kind, Product
+    from .coupling import Passage
+    from .simulation import Inputs, Result, Run
+    from .validation import Check
+
+FOLDER = Path("build")
+DEMO_FOLDER = FOLDER / "demo"
 OUTPUT = Console(soft_wrap=True, highlight=False, markup=False, width=None if sys.stdout.isatty() else 160)
 """All that is printed is meant as it stands: pip install 'hovercraft-fmu[plot]' is no markup."""
 LINE_EVERY = 10.0
 """s: of progress, where it is not shown on a terminal."""
-EXPECTED = (ValueError, OSError, ArithmeticError, SimulationError, ModuleNotFoundError)
-"""What a wrong name, file or value ends in: one line, no traceback."""
+EXPECTED = (ValueError, OSError, ArithmeticError, ModuleNotFoundError)
+"""What a wrong name, file or value ends in, beside what an FMU refuses: one line, no traceback."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -67,6 +59,12 @@ def main(arguments: list[str] | None = None) -> None:
     except click.ClickException as error:
         sys.exit(f"hovercraft-fmu: {error.format_message()}")
     except EXPECTED as error:
+        sys.exit("hovercraft-fmu: " + _one_line(error))
+    except RuntimeError as error:
+        from .host import SimulationError
+
+        if not isinstance(error, SimulationError):
+            raise
         sys.exit("hovercraft-fmu: " + _one_line(error))
     sys.exit(status if isinstance(status, int) else 0)
 
@@ -106,6 +104,8 @@ def build_command(
     KIND is native, native3, python, autopilot, native_loop, native3_loop or python_loop; without it all are written,
     and with --name the native FMU alone.
     """
+    from .building import PRODUCTS, product, variant_product
+
     if name is not None:
         if len(kinds) > 1:
             raise click.UsageError("--name: must be given with one KIND: it is the name of one file")
@@ -119,8 +119,10 @@ def build_command(
         raise click.ClickException(f"not written: {', '.join(missing)}; {reasons[missing[0]]}")
 
 
-def _written(chosen: Product, path: Path) -> str:
+def _written(chosen: "Product", path: Path) -> str:
     """Write a file and say what it is for; returns why there is no machine code where that is missing."""
+    from .fmu.machine_code import NotCompiledError
+
     try:
         chosen.write(path)
     except NotCompiledError as error:
@@ -163,7 +165,7 @@ def of_an_fmu(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
 def simulate_command(
     fmu: Path | None,
-    kind: Kind | None,
+    kind: "Kind | None",
     scene: str | None,
     log: Path | None,
     settings: tuple[str, ...],
@@ -178,6 +180,8 @@ def simulate_command(
 
     FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there.
     """
+    from .simulation import plan
+
     if list_scenes:
         return _print_scenes()
     if scene and log:
@@ -219,7 +223,7 @@ def simulate_command(
 )
 def drive_command(
     fmu: Path | None,
-    kind: Kind | None,
+    kind: "Kind | None",
     record: Path | None,
     preset: str,
     integrator: str | None,
@@ -247,7 +251,7 @@ def drive_command(
         OUTPUT.print(f"recorded {log}; to replay it:\n  {shlex.join(words)}")
 
     end = drive(run, path, record=record, recorded=recorded, time_scale=time_scale)
-    OUTPUT.print(f"ended at ({end.x:.3f}, {end.y:.3f}) m, heading {np.degrees(end.heading):.2f} deg")
+    OUTPUT.print(f"ended at ({end.x:.3f}, {end.y:.3f}) m, heading {math.degrees(end.heading):.2f} deg")
 
 
 @commands.command("validate")
@@ -255,6 +259,9 @@ def drive_command(
 @click.option("--table", is_flag=True, help="Ask other checkers and hosts, too, and print a table (Markdown).")
 def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
     """Check FMUs: the schema, fmpy's validation, and a real run. Without FMU: build/HovercraftNative.fmu."""
+    from .building import default_fmu
+    from .validation import validate, validate_elsewhere
+
     fmus = fmus or (default_fmu(),)
     if table:
         checks = [check for fmu in fmus for check in (*validate(fmu), *validate_elsewhere(fmu))]
@@ -271,6 +278,9 @@ def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
 @click.option("--loop", is_flag=True, help="The closed loop: an autopilot FMU takes it round a course in a crosswind.")
 def demo(loop: bool) -> None:
     """Build the FMUs, check them, and drive them over a recorded control log; see build/demo/."""
+    from .building import default_kind
+    from .scenes import CONTROL_LOGS, SCENES
+    from .simulation import plan
     from .view.plots import check_plot
 
     picture = check_plot(DEMO_FOLDER / ("loop.png" if loop else "ice.png"))
@@ -278,10 +288,10 @@ def demo(loop: bool) -> None:
     if loop:
         return _demo_of_the_loop(native, _built_and_valid("autopilot"), picture)
     python = _built_and_valid("python")
-    run = plan(DEMO_LOG, preset="ice", communication_step=SCENES["ice"].communication_step)
+    run = plan(CONTROL_LOGS / "ice.csv", preset="ice", communication_step=SCENES["ice"].communication_step)
     result, other = (_simulated(run, fmu) for fmu in (native, python))
     _print_result(result)
-    largest, column = max((float(np.abs(result[name] - other[name]).max()), name) for name in result.names)
+    largest, column = max((float(abs(result[name] - other[name]).max()), name) for name in result.names)
     OUTPUT.print(
         f"{native.name} and {python.name} agree: of {len(result.names)} columns and {len(result['time'])} rows "
         f"the largest difference is {largest:.2g}, of {column}"
@@ -296,7 +306,9 @@ def demo(loop: bool) -> None:
     return None
 
 
-def _built_and_valid(kind: Kind) -> Path:
+def _built_and_valid(kind: "Kind") -> Path:
+    from .building import build
+
     fmu = build(kind)
     OUTPUT.print(f"built {fmu}")
     if _validated(fmu):
@@ -305,13 +317,15 @@ def _built_and_valid(kind: Kind) -> Path:
 
 
 def _demo_of_the_loop(fmu: Path, autopilot: Path, picture: Path) -> None:
+    from .coupling import sail
+    from .scenes import VOYAGES
+    from .view.plots import plot_passage
+
     voyage = VOYAGES["crosswind"]
     with _progress(voyage.stop_time) as progress:
         passage = sail(voyage, fmu, autopilot, progress=progress)
     _print_passage(passage)
     OUTPUT.print(f"wrote {passage.write_csv(DEMO_FOLDER / 'loop.csv')}")
-    from .view.plots import plot_passage
-
     OUTPUT.print(f"wrote {plot_passage(passage, picture)}")
 
 
@@ -327,9 +341,11 @@ MEASURE += "\n".join(f"  {name:12} {study.what} ({study.takes})" for name, study
 @commands.command(help=MEASURE)
 @click.argument("name", metavar="NAME", type=click.Choice(list(STUDIES)))
 @click.option("--quick", is_flag=True, help="Fewer cases: below half a minute.")
-@click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Default: build/measure/NAME.")
+@click.option(
+    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Default: build/measure/NAME."
+)
 def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 - MEASURE
-    folder = output or Path("build") / "measure" / name
+    folder = output or FOLDER / "measure" / name
     with _progress(1.0, f"measuring {name}") as tell:
         report = carry_out(name, quick, folder, tell)
     OUTPUT.print(f"{report}\n\nwrote {folder}/")
@@ -342,12 +358,15 @@ def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 
               help="fmu, or batch: the compiled kernel, all craft at once, with the native FMU's bits.")  # fmt: skip
 @click.option("--workers", type=int, metavar="N", help="Processes on this machine. Default: one a processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
-@click.option("--output", type=click.Path(path_type=Path), metavar="DIR", help="Default: build/sweep/ and the study.")
+@click.option(
+    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    help="Default: build/sweep/ and the study.",
+)  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the results.")
 def sweep_command(
     study: str,
     fmu: Path | None,
-    kind: Kind | None,
+    kind: "Kind | None",
     output: Path | None,
     plot: Path | None,
     engine: str,
@@ -384,7 +403,7 @@ def sweep_command(
 
 
 @commands.command("cross-check")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False))
 def cross_check_command(folder: Path) -> None:
     """Write what the FMI cross-check asks for: the native FMU, inputs, options, a reference result."""
     from .cross_check import write_cross_check
@@ -440,8 +459,10 @@ def _tell_lines(doing: str, task: Task, ended: Event) -> None:
         click.echo(f"{doing}: {task.percentage:.0f} %, {perf_counter() - begun:.0f} s", err=True)
 
 
-def _named(fmu: Path | None, kind: Kind | None) -> Path:
+def _named(fmu: Path | None, kind: "Kind | None") -> Path:
     """The file that is to be run, and say which it is."""
+    from .building import default_fmu
+
     if fmu and kind:
         raise click.UsageError(f"--fmu {kind}: must not be given together with the file {fmu}")
     path = fmu or default_fmu(kind)
@@ -450,13 +471,17 @@ def _named(fmu: Path | None, kind: Kind | None) -> Path:
     return path
 
 
-def _simulated(run: Run, fmu: Path) -> Result:
+def _simulated(run: "Run", fmu: Path) -> "Result":
+    from .simulation import run_fmu
+
     with _progress(run.stop_time) as progress:
         return run_fmu(run, fmu, progress)
 
 
 def _validated(fmu: Path) -> int:
     """Check one FMU, print what was checked, and return the number of problems."""
+    from .validation import validate
+
     OUTPUT.print(f"checking {fmu}")
     problems = 0
     for check in validate(fmu):
@@ -467,7 +492,7 @@ def _validated(fmu: Path) -> int:
     return problems
 
 
-def _checked_table(checks: list[Check]) -> str:
+def _checked_table(checks: "list[Check]") -> str:
     rows = [
         (
             check.checker,
@@ -481,6 +506,8 @@ def _checked_table(checks: list[Check]) -> str:
 
 
 def _print_scenes() -> None:
+    from .scenes import SCENES
+
     table = Table(box=None, pad_edge=False)
     for title in ("scene", "what happens", "craft", "duration", "exact solution"):
         table.add_column(title)
@@ -505,8 +532,8 @@ def _print_extremes(folder: Path) -> None:
         OUTPUT.print(table)
 
 
-def _print_passage(passage: Passage) -> None:
-    off = np.abs(passage["cross_track_error"])
+def _print_passage(passage: "Passage") -> None:
+    off = abs(passage["cross_track_error"])
     arrived = f"after {passage['time'][-1]:g} s" if passage.arrived else "no"
     distance = passage.distance
     _print_rows(
@@ -527,17 +554,17 @@ def _print_rows(title: str, rows: dict[str, str]) -> None:
     OUTPUT.print(table)
 
 
-def _print_result(result: Result) -> None:
+def _print_result(result: "Result") -> None:
     run = result.run
     rows = {
         "duration": f"{result['time'][-1] - run.start_time:g} s, {len(result['time']) - 1} communication steps",
         "sub-steps": f"{result['substeps'][-1]}",
         "distance": f"{result.distance:.2f} m, {result.distance / run.craft.length:.1f} craft lengths",
         "largest speed": f"{result['speed'].max():.3f} m/s",
-        "headings": f"{np.degrees(result['pose.heading'].min()):.1f} ... "
-        f"{np.degrees(result['pose.heading'].max()):.1f} deg",
+        "headings": f"{math.degrees(result['pose.heading'].min()):.1f} ... "
+        f"{math.degrees(result['pose.heading'].max()):.1f} deg",
         "end position": f"({result['pose.x'][-1]:.3f}, {result['pose.y'][-1]:.3f}) m",
-        "end heading": f"{np.degrees(result['pose.heading'][-1]):.2f} deg",
+        "end heading": f"{math.degrees(result['pose.heading'][-1]):.2f} deg",
         "end speed": f"{result['speed'][-1]:.4f} m/s",
     }
     _print_rows(f"{run.title}: {run.method}", rows)
@@ -545,7 +572,7 @@ def _print_result(result: Result) -> None:
         OUTPUT.print(f"warning: {warning}")
 
 
-def _write(result: Result, output: Path | None, plot: Path | None) -> None:
+def _write(result: "Result", output: Path | None, plot: Path | None) -> None:
     if output:
         OUTPUT.print(f"wrote {result.write_csv(output)}")
     if plot:
@@ -554,7 +581,7 @@ def _write(result: Result, output: Path | None, plot: Path | None) -> None:
         OUTPUT.print(f"wrote {plot_run(result, plot)}")
 
 
-def _animate(results: Sequence[Result], animation: Path) -> None:
+def _animate(results: "Sequence[Result]", animation: Path) -> None:
     from .view.animation import animate
 
     with _progress(1.0, "drawing") as tell:

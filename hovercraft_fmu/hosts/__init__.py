@@ -27,6 +27,8 @@ OUTPUTS = tuple(variable.name for variable in VARIABLES if variable.causality ==
 INPUT_REFERENCES = [BY_NAME[name].reference for name in INPUTS]
 OUTPUT_REFERENCES = [BY_NAME[name].reference for name in OUTPUTS]
 COMPILERS = ("cc", "gcc", "clang")
+TIME_LIMIT = 300.0
+"""s, of a host: most take a few."""
 PYTHON_MODULE = "resources/slavemodule.txt"
 """What tells an FMU that pythonfmu made: the name of its module."""
 
@@ -119,9 +121,13 @@ def run_in(host: str, fmu: Path) -> list[list[float]]:
 def rows_of_module(module: str, *arguments: str, cwd: Path | None = None) -> list[list[float]]:
     """What `python -m module` prints last with these arguments, as JSON. Raises HostError where that fails."""
     command = module_command(module, *arguments)
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, timeout=300)
+    try:
+        done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, timeout=TIME_LIMIT)
+    except subprocess.TimeoutExpired as error:
+        raise HostError(f"it did not end within {TIME_LIMIT:g} s") from error
     if done.returncode != 0:
-        raise HostError(f"exit status {done.returncode}: {done.stderr.strip()[-500:]}")
+        said = done.stderr.strip().splitlines()[-1:]  # of a traceback the error
+        raise HostError(": ".join((f"exit status {done.returncode}", *said)))
     # Ecos, in C, leaves a line of its own behind it now and then
     rows: list[list[float]] = json.loads(next(x for x in reversed(done.stdout.splitlines()) if x.startswith("[[")))
     return rows
