@@ -1,5 +1,5 @@
 /* Loops without Python in them, for step_costs.py to time: a host's calls of an FMU, and the equations in one plain loop,
-   which comes to the bits of the model. */
+   as people write them. */
 
 #include <math.h>
 #include <stddef.h>
@@ -11,19 +11,18 @@
 void plain_loop(double mass, double inertia, double k, double x_d, double thrust, double side, double turn, double h,
                 int n, double state[6])
 {
-    const double hm = h / mass, hi = h / inertia, km = k * hm, ki = k * x_d * hi;
-    const double dt = thrust * hm, ds = side * hm, dr = turn * hi;
     double x = state[0], y = state[1], heading = state[2], vx = state[3], vy = state[4], r = state[5];
     for (int i = 0; i < n; i++) {
         const double c = cos(heading), s = sin(heading);
-        const double u = c * vx + s * vy, w = (c * vy - s * vx) + r * x_d, q = sqrt(u * u + w * w);
-        const double fx = dt - km * u * q, fy = ds - km * w * q;
-        r = r + (dr - ki * w * q);
-        vx = vx + (c * fx - s * fy);
-        vy = vy + (s * fx + c * fy);
-        x = x + h * vx;
-        y = y + h * vy;
-        heading = heading + h * r;
+        const double u = c * vx + s * vy, w = c * vy - s * vx + r * x_d;
+        const double kq = k * sqrt(u * u + w * w), drag_y = -kq * w;
+        const double force_x = thrust - kq * u, force_y = drag_y + side;
+        vx += h * ((c * force_x - s * force_y) / mass);
+        vy += h * ((s * force_x + c * force_y) / mass);
+        r += h * ((x_d * drag_y + turn) / inertia);
+        x += h * vx;
+        y += h * vy;
+        heading += h * r;
     }
     state[0] = x, state[1] = y, state[2] = heading, state[3] = vx, state[4] = vy, state[5] = r;
 }
