@@ -137,7 +137,7 @@ UNIT = """\
 def fleet_library() -> Library:
     """Of many craft at once: host/fleet.py loads it."""
     kernel = [C_FOLDER / f"{name}.{suffix}" for name in ("kernel", "logarithm", "memory", "trig") for suffix in "ch"]
-    kernel += [C_FOLDER / "hidden.h", C_FOLDER / "root.h"]
+    kernel += [C_FOLDER / f"{name}.h" for name in ("environment", "hidden", "root")]
     files = {file.name: file.read_bytes() for file in (*kernel, *sorted((C_FOLDER / "fleet").iterdir()))}
     return Library("HovercraftFleet", ("fleet.c", "memory.c"), files)
 

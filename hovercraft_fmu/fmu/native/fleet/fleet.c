@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "environment.h"
 #include "logarithm.c"
 #include "trig.c"
 
@@ -40,11 +41,11 @@ static ALWAYS_INLINE lanes least(lanes a, lanes b)
 
 static ALWAYS_INLINE lanes root(lanes a)
 {
-#if defined(__clang__)
+#if defined(__clang__) && __clang_major__ >= 18
     return __builtin_elementwise_sqrt(a);
 #else
     for (int i = 0; i < LANES; i++)
-        a[i] = sqrt(a[i]);
+        a[i] = square_root(a[i]);
     return a;
 #endif
 }
@@ -326,9 +327,9 @@ static int64_t advance_block(struct block *block, const struct fleet *fleet, con
     }
     load(block, &f, &z, &h);
     if (way->integrator == RK4)
-        (wide ? wide_rk4 : lanes_rk4)(&f, h, block->n, &z);
+        (wide ? wide_rk4 : lanes_rk4)(&f, &h, block->n, &z);
     else
-        (wide ? wide_semi_implicit_euler : lanes_semi_implicit_euler)(&f, h, block->n, &z);
+        (wide ? wide_semi_implicit_euler : lanes_semi_implicit_euler)(&f, &h, block->n, &z);
     for (int i = 0; i < block->filled; i++) {
         struct stretch made = {
             .state = {z.x[i], z.y[i], z.heading[i], z.vx[i], z.vy[i], z.yaw_rate[i]},
@@ -377,6 +378,7 @@ int64_t fleet_advance(const struct fleet *fleet, const struct way *way, const st
         !is_there(&way->tolerance, 1) || !is_there(&way->proposed, 1) || !can_be_reached(reached) ||
         way->integrator < SEMI_IMPLICIT_EULER || way->integrator > ADAPTIVE)
         return -1;
+    const struct environment host = environment_enter();
     const bool wide = is_wide();
     struct block block = {.filled = 0};
     int64_t refused = 0;
@@ -388,13 +390,17 @@ int64_t fleet_advance(const struct fleet *fleet, const struct way *way, const st
             refused += advance_alone(fleet, way, reached, i);
         }
     }
-    return block.filled ? refused + advance_block(&block, fleet, way, reached, wide) : refused;
+    if (block.filled > 0)
+        refused += advance_block(&block, fleet, way, reached, wide);
+    environment_leave(&host);
+    return refused;
 }
 
 int32_t fleet_derived(const struct fleet *fleet, double *derived)
 {
     if (!fleet || !derived || fleet->count < 0 || !is_there(fleet->constants, FLEET_CONSTANTS))
         return -1;
+    const struct environment host = environment_enter();
     for (int64_t i = 0; i < fleet->count; i++) {
         const struct craft craft = craft_at(fleet, i);
         const struct derived of_craft = kernel_derived(&craft);
@@ -403,6 +409,7 @@ int32_t fleet_derived(const struct fleet *fleet, double *derived)
         for (size_t k = 0; k < sizeof values / sizeof *values; k++)
             derived[(int64_t)k * fleet->count + i] = values[k];
     }
+    environment_leave(&host);
     return 0;
 }
 
@@ -411,6 +418,7 @@ int32_t fleet_observe(const struct fleet *fleet, double *const motion[2], double
     if (!is_fleet(fleet) || !motion || !loads || !motion[0] || !motion[1] || !loads[0] || !loads[1] || !loads[2] ||
         !loads[3])
         return -1;
+    const struct environment host = environment_enter();
     for (int64_t i = 0; i < fleet->count; i++) {
         const struct state state = state_at(fleet, i);
         const struct controls controls = controls_at(fleet->controls, i);
@@ -422,5 +430,6 @@ int32_t fleet_observe(const struct fleet *fleet, double *const motion[2], double
         loads[2][i] = on.moment;
         loads[3][i] = on.kq;
     }
+    environment_leave(&host);
     return 0;
 }

@@ -1,5 +1,6 @@
 /* Plain drag with controls that hold, LANES craft side by side: the loops of kernel.c, operation by operation, so that
-   each lane has its bits. Included once for each instruction set; LANE(name) gives the names. */
+   each lane has its bits. Included once for each instruction set; LANE(name) gives the names. Between functions that are
+   not in line lanes go by pointer: on Windows a copy on the stack may be aligned too little. */
 
 /* trig_sine_cosine of each lane. What is rare there is left to it. */
 static ALWAYS_INLINE void LANE(sine_cosine)(lanes angle, lanes *sine, lanes *cosine)
@@ -37,9 +38,11 @@ static ALWAYS_INLINE lanes LANE(push)(const struct push *f, lanes heading, lanes
     return q;
 }
 
-static void LANE(semi_implicit_euler)(const struct push *push, lanes h, int64_t n, struct lane_states *states)
+static void LANE(semi_implicit_euler)(const struct push *push, const lanes *step, int64_t n,
+                                      struct lane_states *states)
 {
     const struct push f = *push;
+    const lanes h = *step;
     struct lane_states z = *states;
     lanes push_x, push_y, turn;
     for (int64_t i = 0; i < n; i++) {
@@ -58,10 +61,10 @@ static void LANE(semi_implicit_euler)(const struct push *push, lanes h, int64_t 
     *states = z;
 }
 
-static void LANE(rk4)(const struct push *push, lanes h, int64_t n, struct lane_states *states)
+static void LANE(rk4)(const struct push *push, const lanes *step, int64_t n, struct lane_states *states)
 {
     const struct push f = *push;
-    const lanes half = 0.5 * h, sixth = h / 6.0, square = h * h / 6.0;
+    const lanes h = *step, half = 0.5 * h, sixth = h / 6.0, square = h * h / 6.0;
     struct lane_states z = *states;
     lanes x1, x2, x3, x4, y1, y2, y3, y4, t1, t2, t3, t4;
     for (int64_t i = 0; i < n; i++) {
