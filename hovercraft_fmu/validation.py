@@ -13,7 +13,7 @@ import fmpy.validation
 import numpy as np
 from lxml import etree
 
-from . import hosts
+from . import elsewhere
 from .fmu.interface import HOVERCRAFT
 from .host import Fmu, SimulationError, read_description
 
@@ -68,14 +68,14 @@ def validate_elsewhere(path: str | os.PathLike[str]) -> Iterator[Check]:
     """
     path = Path(path)
     read_description(path, validate=False, model=HOVERCRAFT.name)
-    others = hosts.hosts_of(path)
-    toolbox = hosts.HOSTS["fmucontainer"]
+    others = elsewhere.hosts_of(path)
+    toolbox = elsewhere.HOSTS["fmucontainer"]
     what, missing = "fmutool -check: schema and semantics", toolbox.missing()
     version = "" if missing else toolbox.version()
     yield Check("fmu-manipulation-toolbox", version, what, [] if missing else _fmutool_problems(path), missing)
     try:
-        expected = hosts.run_in("fmpy", path)
-    except hosts.HostError as error:  # then there is nothing to compare the others with
+        expected = elsewhere.run_in("fmpy", path)
+    except elsewhere.HostError as error:  # then there is nothing to compare the others with
         yield Check("fmpy", fmpy.__version__, "steps with changing inputs", [str(error)])
         return
     for host in others.values():
@@ -83,20 +83,20 @@ def validate_elsewhere(path: str | os.PathLike[str]) -> Iterator[Check]:
             yield _host_check(host, path, expected)
 
 
-def _host_check(host: hosts.Host, path: Path, expected: list[list[float]]) -> Check:
+def _host_check(host: elsewhere.Host, path: Path, expected: list[list[float]]) -> Check:
     what = f"{len(expected)} steps with changing inputs: the bits that fmpy gives"
     missing = host.missing()
     if missing:
         return Check(host.name, "", what, [], missing)
     try:
-        rows = hosts.run_in(host.name, path)
-    except hosts.HostError as error:
+        rows = elsewhere.run_in(host.name, path)
+    except elsewhere.HostError as error:
         return Check(host.name, host.version(), what, [str(error)])
     return Check(host.name, host.version(), what, [] if rows == expected else ["the outputs must equal those in fmpy"])
 
 
 def _fmutool_problems(path: Path) -> list[str]:
-    command = hosts.module_command("fmu_manipulation_toolbox", "-input", str(path), "-check")
+    command = elsewhere.module_command("fmu_manipulation_toolbox", "-input", str(path), "-check")
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     lines = (done.stdout + done.stderr).splitlines()
     problems = [line for line in lines if line.startswith(("ERROR", "WARNING", "CRITICAL", "FATAL"))]

@@ -6,6 +6,8 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+from hovercraft_fmu.fmu.block import checksum
+
 MAGIC = b"HOVERFMU"
 DIGEST, BUILD, SUBSTEPS = slice(64), slice(12, 44), 44
 """Python: the hexadecimal digest ahead. Native, as serialize.c says: where the build and the first integer stand."""
@@ -38,8 +40,5 @@ def _rewritten(blob: bytes, change: Callable[[dict[str, Any]], object]) -> bytes
 
 
 def signed(blob: bytes) -> bytes:
-    """With the checksum right again, FNV-1a of 64 bit."""
-    total = 0xCBF29CE484222325
-    for byte in blob[:-8]:
-        total = ((total ^ byte) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF
-    return blob[:-8] + struct.pack("<Q", total)
+    """With the checksum right again."""
+    return blob[:-8] + struct.pack("<Q", checksum(blob[:-8]))

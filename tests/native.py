@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from hovercraft_fmu import hosts
+from hovercraft_fmu import elsewhere
+from hovercraft_fmu.elsewhere import compiler
 from hovercraft_fmu.fmu.description import NATIVE, Flavour
 from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, headers, sources
-from hovercraft_fmu.hosts import compiler
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS, Stretch
@@ -22,7 +22,7 @@ from hovercraft_fmu.scenes import SCENES
 
 C_TESTS = Path(__file__).parent / "c"
 KERNEL_FILES = tuple(C_FOLDER / f"{name}.c" for name in ("kernel", "trig", "logarithm"))
-C_INCLUDES = ("-I", str(Path(hosts.__file__).parent))
+C_INCLUDES = ("-I", str(Path(elsewhere.__file__).parent))
 """Of the calls of both standards."""
 OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
 NO_RAMP = Controls(0.0)

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from fmpy.fmi1 import FMICallException
 
+from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, HOSTS, INPUT_REFERENCES, OUTPUTS, hosts_of
 from hovercraft_fmu.fmu.interface import HOVERCRAFT, VARIABLES
-from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, HOSTS, INPUT_REFERENCES, OUTPUTS, hosts_of
 from hovercraft_fmu.model.integrators import integrator_number
 from hovercraft_fmu.simulation import plan
 from hovercraft_fmu.sweep.study import read_study
@@ -112,7 +112,7 @@ from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
-from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, INPUT_REFERENCES, OUTPUT_REFERENCES
+from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, INPUT_REFERENCES, OUTPUT_REFERENCES
 
 fmu, integers, reals = sys.argv[1], json.loads(sys.argv[2]), json.loads(sys.argv[3])
 log_output_level(CosimLogLevel.ERROR)
@@ -135,7 +135,7 @@ print("\\n" + json.dumps(rows))
 """
 ECOS = """
 import json, sys
-from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, OUTPUTS, load_tbb
+from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, OUTPUTS, load_tbb
 from hovercraft_fmu.fmu.interface import INPUTS
 
 load_tbb()

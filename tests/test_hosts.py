@@ -10,10 +10,10 @@ import pytest
 from click.testing import CliRunner
 
 from hovercraft_fmu.cli import commands
+from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, hosts_of, module_command, run_in
 from hovercraft_fmu.fmu import document
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from hovercraft_fmu.fmu.document import pages
-from hovercraft_fmu.hosts import COMMUNICATION_STEP, CONTROLS, hosts_of, module_command, run_in
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.observation import observe_motion
@@ -33,7 +33,7 @@ def test_fmpy_gives_the_bits_of_the_bare_model(fmu: Path) -> None:
     assert run_in("fmpy", fmu) == expected
 
 
-@pytest.mark.parametrize("started", ["hovercraft_fmu.hosts", "fmu_manipulation_toolbox"])
+@pytest.mark.parametrize("started", ["hovercraft_fmu.elsewhere", "fmu_manipulation_toolbox"])
 def test_a_host_runs_no_module_of_the_current_folder(
     started: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -31,9 +31,9 @@ from hovercraft_fmu.coupling import (
     sail,
     sail_bare,
 )
+from hovercraft_fmu.elsewhere import HOSTS
 from hovercraft_fmu.fmu.interface import HOVERCRAFT, STATES
 from hovercraft_fmu.host import SimulationError
-from hovercraft_fmu.hosts import HOSTS
 from hovercraft_fmu.model.integrators import integrator
 from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import VOYAGES, Voyage

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from hovercraft_fmu.cli import commands
-from hovercraft_fmu.hosts import compiler
+from hovercraft_fmu.elsewhere import compiler
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS

@@ -16,7 +16,7 @@ from fmpy.fmi1 import FMICallException
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hovercraft_fmu import build, hosts
+from hovercraft_fmu import build, elsewhere
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu.block import HEAD, MARK, Block, block, checksum, patched
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
@@ -95,22 +95,22 @@ def test_an_input_that_nothing_is_said_of_holds_its_start_value(tmp_path: Path, 
     assert found["wind.y"].min() == 0.25
 
 
-@pytest.mark.parametrize("host", hosts.HOSTS)
+@pytest.mark.parametrize("host", elsewhere.HOSTS)
 def test_every_host_runs_its_start_values(host: str, ice: Path, each_fmu: Path) -> None:
-    if host not in hosts.hosts_of(each_fmu):  # of FMI 3.0 libcosimpy knows nothing
+    if host not in elsewhere.hosts_of(each_fmu):  # of FMI 3.0 libcosimpy knows nothing
         return
-    if missing := hosts.hosts_of(each_fmu)[host].missing():
+    if missing := elsewhere.hosts_of(each_fmu)[host].missing():
         pytest.skip(f"{host}: {missing}")
     with one(each_fmu) as (instance, _):
         put(instance, air_density=0.0023769, step_size=0.1)
         instance.setInteger([reference("integrator")], [3])
         start(instance)
         expected = []
-        for k, controls in enumerate(hosts.CONTROLS):
-            instance.setReal(hosts.INPUT_REFERENCES, controls)
-            instance.doStep(k * hosts.COMMUNICATION_STEP, hosts.COMMUNICATION_STEP)
-            expected.append(get(instance, *hosts.OUTPUTS))
-    assert hosts.run_in(host, ice) == expected
+        for k, controls in enumerate(elsewhere.CONTROLS):
+            instance.setReal(elsewhere.INPUT_REFERENCES, controls)
+            instance.doStep(k * elsewhere.COMMUNICATION_STEP, elsewhere.COMMUNICATION_STEP)
+            expected.append(get(instance, *elsewhere.OUTPUTS))
+    assert elsewhere.run_in(host, ice) == expected
 
 
 def test_reset_brings_them_back_and_a_host_may_still_set_others(ice: Path, each_fmu: Path) -> None:
@@ -237,7 +237,7 @@ def test_built_from_its_sources_it_is_the_same(ice: Path, flavour: str, tmp_path
 
 
 def test_a_loop_with_it_sails_with_its_start_values(native_fmu: Path, autopilot: Path, tmp_path: Path) -> None:
-    if missing := hosts.HOSTS["libcosimpy"].missing():
+    if missing := elsewhere.HOSTS["libcosimpy"].missing():
         pytest.skip(f"libcosimpy: {missing}")
     coarse = built(variant(NATIVE, "Coarse", OWN), tmp_path / "Coarse.fmu")
     folders = [tmp_path / name for name in ("ssp", "functions", "usual")]

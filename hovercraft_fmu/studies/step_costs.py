@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 import polars as pl
 
+from ..elsewhere import COMPILERS, compiler
 from ..fmu.description import NATIVE
 from ..fmu.interface import INPUTS
 from ..fmu.machine_code import headers, sources
@@ -18,7 +19,6 @@ from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..host import Fmu, Instance
 from ..host.messages import WARNING
-from ..hosts import COMPILERS, compiler
 from ..model.craft import Craft
 from ..model.dynamics import Controls, State, actuation
 from ..model.integrators import INTEGRATORS

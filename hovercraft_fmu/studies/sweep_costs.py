@@ -15,10 +15,10 @@ import numpy as np
 import polars as pl
 import psutil
 
+from ..elsewhere import module_command
 from ..fmu.interface import STATES
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
-from ..hosts import module_command
 from ..simulation import plan
 from ..sweep.runner import BATCH, FMU, sweep
 from ..sweep.study import read_study

@@ -115,7 +115,7 @@ def run_in(host: str, fmu: Path) -> list[list[float]]:
     Raises:
         HostError: the host failed; the last of what it printed.
     """
-    return rows_of_module("hovercraft_fmu.hosts", host, str(fmu.absolute()))
+    return rows_of_module("hovercraft_fmu.elsewhere", host, str(fmu.absolute()))
 
 
 def rows_of_module(module: str, *arguments: str, cwd: Path | None = None) -> list[list[float]]:

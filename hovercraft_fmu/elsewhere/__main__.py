@@ -1,4 +1,4 @@
-"""python -m hovercraft_fmu.hosts HOST FMU: run it, print the rows as JSON."""
+"""python -m hovercraft_fmu.elsewhere HOST FMU: run it, print the rows as JSON."""
 
 import json
 import sys
