@@ -5,7 +5,6 @@ import re
 import sys
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
@@ -43,10 +42,8 @@ class MachineCodeHook(BuildHookInterface):  # type: ignore[type-arg, misc, unuse
 
 
 def _machine_code(root: str) -> Any:
-    """The module of the package, without what the package itself imports: nothing of that is installed yet."""
-    package = ModuleType("hovercraft_fmu")
-    package.__path__ = [str(Path(root) / "hovercraft_fmu")]
-    sys.modules["hovercraft_fmu"] = package
+    """The module of the package, which needs nothing that is not installed yet."""
+    sys.path.insert(0, root)
     return import_module("hovercraft_fmu.fmu.machine_code")
 
 
