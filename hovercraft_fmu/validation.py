@@ -46,7 +46,7 @@ def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
     """
     path = Path(path)
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes one")
+        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes them into build/")
     description = read_description(path, validate=False)
     version = description.fmiVersion
     yield Check("lxml", etree.__version__, f"XML schema of FMI {version}", _schema_problems(path, version))

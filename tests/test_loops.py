@@ -141,7 +141,7 @@ def test_what_cannot_be_is_refused(fmu: Path, autopilot: Path, tmp_path: Path) -
     with pytest.raises(ValueError, match=r"step_size = 0\.1: must be one of mass, inertia"):
         sail_bare(Voyage("bad", "", {"step_size": 0.1}))
     with pytest.raises(
-        FileNotFoundError, match=r"nix\.fmu: no such FMU; 'hovercraft-fmu build' writes build/Autopilot"
+        FileNotFoundError, match=r"nix\.fmu: no such FMU; 'hovercraft-fmu build' writes them into build/"
     ):
         sail("calm", fmu, tmp_path / "nix.fmu")
     with pytest.raises(SimulationError, match=r"mass = -1.0: must be greater than 0"):

@@ -37,7 +37,7 @@ from hovercraft_fmu.sweep import STUDIES, load, read_study, sweep
 from hovercraft_fmu.sweep import runner as runner_module
 from hovercraft_fmu.sweep.charts import plot_sweep
 from hovercraft_fmu.sweep.engines import Plan
-from hovercraft_fmu.sweep.quantities import DERIVED, OBSERVED
+from hovercraft_fmu.sweep.quantities import FORMULAS, OBSERVED
 from hovercraft_fmu.sweep.study import Factor
 from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
 from tests.conftest import ROOT
@@ -192,7 +192,7 @@ def test_the_batch_has_the_rows_of_the_native_fmu(
         "set": {"step_size": 0.02},
         "sweep": {"integrator": [method.name for method in INTEGRATORS], **sweeps},
         "keep": {
-            "end": [*OBSERVED, *DERIVED],
+            "end": [*OBSERVED, *FORMULAS],
             "trajectory": {"every": 0.1, "of": list(OBSERVED)},
             "events": {"moves": {"of": "speed", "above": 0.1, "values": ["pose.x"]}},
         },

@@ -13,8 +13,8 @@ AUTOPILOT = PYTHON.of(AUTOPILOT_MODEL)
 HERE = Path(__file__).parent
 PICTURE = "loop.png"
 """A voyage, as `hovercraft-fmu demo --loop` draws it."""
-ALWAYS = ("style.css", "externalDependencies.txt")
-"""Of the hovercraft's documentation, what holds for this FMU, too."""
+REQUIREMENTS = "externalDependencies.txt"
+"""Of the hovercraft's documentation: it holds for this FMU, too."""
 
 
 def build_autopilot(path: str | os.PathLike[str] = f"build/{AUTOPILOT.identifier}.fmu") -> Path:
@@ -25,8 +25,7 @@ def build_autopilot(path: str | os.PathLike[str] = f"build/{AUTOPILOT.identifier
 def _documents() -> dict[str, bytes]:
     values = {"model": AUTOPILOT_MODEL, "variables": AUTOPILOT_MODEL.variables, "types": {}, "law": law}
     pages = {name: page.encode() for name, page in rendered(HERE, values).items()}
-    shared = {name: (FOLDER / name).read_bytes() for name in ALWAYS}
-    return {**shared, PICTURE: (HERE / PICTURE).read_bytes(), **pages}
+    return {REQUIREMENTS: (FOLDER / REQUIREMENTS).read_bytes(), PICTURE: (HERE / PICTURE).read_bytes(), **pages}
 
 
 CONTENT = Content(

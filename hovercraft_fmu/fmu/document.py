@@ -66,8 +66,8 @@ def documents(flavour: Flavour) -> dict[str, bytes]:
 
 
 def _goes(path: Path) -> bool:
-    """Whether a file goes in as it is: tables of checks are on a page."""
-    return path.is_file() and path.suffix not in (".jinja", ".md")
+    """Whether a file goes in as it is: tables of checks are on a page, the style is in each."""
+    return path.is_file() and path.suffix not in (".jinja", ".md", ".css")
 
 
 def rendered(folder: Path, values: Mapping[str, Any]) -> dict[str, str]:

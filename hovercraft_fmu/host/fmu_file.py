@@ -76,8 +76,7 @@ def read_description(path: Path, validate: bool = True, model: str | None = None
             another model than the given one.
     """
     if not path.is_file():
-        name = model or HOVERCRAFT.name
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes build/{name}.fmu")
+        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes them into build/")
     try:
         description = fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds

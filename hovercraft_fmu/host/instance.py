@@ -38,7 +38,7 @@ class Events(NamedTuple):
 class Instance:
     """An instance of an FMU: start values by name, initialization, steps, groups of variables, states.
 
-        with Fmu("build/Hovercraft.fmu") as fmu, fmu.instance() as craft:
+        with Fmu("build/HovercraftNative.fmu") as fmu, fmu.instance() as craft:
             controls, pose = craft.port("thrust", "port_thruster"), craft.port("pose.x", "pose.y", "substeps")
             craft.start({"mass": 200.0, "integrator": "rk4"})   # and `craft.reset()` before the next start
             for k in range(100):

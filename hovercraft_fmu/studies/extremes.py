@@ -54,7 +54,7 @@ def chosen(batch: Batch, which: Any) -> Batch:
     return Batch(craft.some(which), Controls(*held), State(*at), h[which], substeps)
 
 
-class Run(NamedTuple):
+class Drawn(NamedTuple):
     """One run, in plain numbers."""
 
     craft: Craft
@@ -65,10 +65,10 @@ class Run(NamedTuple):
     substeps: int
 
 
-def single(batch: Batch, i: int) -> Run:
+def single(batch: Batch, i: int) -> Drawn:
     """One of the runs."""
     held, at = ([value[i].item() for value in cast(Any, values)] for values in (batch.controls, batch.start))
-    return Run(batch.craft.one(i), Controls(*held), State(*at), batch.h[i].item(), batch.substeps)
+    return Drawn(batch.craft.one(i), Controls(*held), State(*at), batch.h[i].item(), batch.substeps)
 
 
 class Reached(NamedTuple):

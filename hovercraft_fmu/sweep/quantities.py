@@ -20,7 +20,7 @@ OBSERVED = (*STATES, *MOTION, *ACTION, *WATCHED)
 """What is read from the FMU, or worked out of the bare model."""
 
 
-class Derived(NamedTuple):
+class Formula(NamedTuple):
     """A quantity that is worked out of what is read; for what they are see documentation/sweeps.html."""
 
     unit: str
@@ -28,14 +28,14 @@ class Derived(NamedTuple):
     of: Callable[..., Any]
 
 
-DERIVED: Mapping[str, Derived] = MappingProxyType(
+FORMULAS: Mapping[str, Formula] = MappingProxyType(
     {
-        "drift_angle": Derived(
+        "drift_angle": Formula(
             "rad",
             ("body.surge", "body.sway"),
             lambda surge, sway: np.arctan2(-sway, surge),
         ),
-        "turning_radius": Derived(
+        "turning_radius": Formula(
             "m",
             ("speed", "velocity.yaw_rate"),
             lambda speed, yaw_rate: speed / np.abs(yaw_rate),
@@ -91,14 +91,14 @@ class Keep:
         asked = {*self.end, *self.minimum, *self.maximum, *self.trajectory}
         asked |= {name for event in self.events for name in (event.of, *event.values)}
         asked |= {"pose.x", "pose.y"} if self.distance else set()
-        parts = {part for name in asked & DERIVED.keys() for part in DERIVED[name].parts}
+        parts = {part for name in asked & FORMULAS.keys() for part in FORMULAS[name].parts}
         return tuple(name for name in OBSERVED if name in asked | parts)
 
 
 def unit(quantity: str) -> str:
     """The unit of a quantity, or of a column of a row."""
-    if quantity in DERIVED:
-        return DERIVED[quantity].unit
+    if quantity in FORMULAS:
+        return FORMULAS[quantity].unit
     if quantity in BY_NAME:
         return BY_NAME[quantity].unit or ""
     if quantity == "distance":
@@ -120,11 +120,11 @@ def quantity_function(keep: Keep, record: Record) -> Callable[[str], Values]:
     place = {name: i for i, name in enumerate(keep.read)}
 
     def values(name: str) -> Values:
-        if name not in DERIVED:
+        if name not in FORMULAS:
             return record[:, :, place[name]]
-        parts = [record[:, :, place[part]] for part in DERIVED[name].parts]
+        parts = [record[:, :, place[part]] for part in FORMULAS[name].parts]
         with np.errstate(all="ignore"):  # straight ahead the radius is infinite
-            found: Values = DERIVED[name].of(*parts)
+            found: Values = FORMULAS[name].of(*parts)
         return found
 
     return values

@@ -21,7 +21,7 @@ from ..model.integrators import integrator
 from ..model.subcycling import check_step_size, check_tolerance
 from ..scenes import Signals
 from ..simulation import Run, plan, read_inputs
-from .quantities import DERIVED, OBSERVED, Event, Keep
+from .quantities import FORMULAS, OBSERVED, Event, Keep
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -350,7 +350,7 @@ def _few_enough(runs: int) -> int:
 
 def _keep(table: Mapping[str, Any], run: Run) -> Keep:
     _known(table, ("end", "minimum", "maximum", "distance", "events", "trajectory"), "keep.")
-    known = (*OBSERVED, *DERIVED)
+    known = (*OBSERVED, *FORMULAS)
     end, minimum, maximum = (_names(table.get(key, []), f"keep.{key}", known) for key in ("end", "minimum", "maximum"))
     distance = table.get("distance", False)
     if not isinstance(distance, bool):
