@@ -34,14 +34,14 @@ def test_the_parts_are_found() -> None:
 
 @pytest.mark.once
 @pytest.mark.parametrize("number", range(len(PRINTED)))
-def test_its_code_runs(number: int, fmu: Path, native_fmu: Path, autopilot: Path, fresh: Fresh, tmp_path: Path) -> None:
+def test_its_code_runs(number: int, native_fmu: Path, autopilot: Path, fresh: Fresh, tmp_path: Path) -> None:
     code = BLOCKS[number]
     if "libcosimpy" in code and (missing := HOSTS["libcosimpy"].missing()):
         pytest.skip(missing)
     (tmp_path / "build").mkdir()
-    for path in (fmu, native_fmu, autopilot):
+    for path in (native_fmu, autopilot):
         shutil.copy(path, tmp_path / "build" / path.name)
-    build_ssp(tmp_path / "build" / "HovercraftLoop.ssp", fmu, autopilot)
+    build_ssp(tmp_path / "build" / "HovercraftNativeLoop.ssp", native_fmu, autopilot)
     assert re.search(PRINTED[number], fresh(code))
 
 
@@ -50,7 +50,7 @@ def test_its_code_runs(number: int, fmu: Path, native_fmu: Path, autopilot: Path
 def test_its_first_sections_run_with_fmi_3(number: int, native3_fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
     (tmp_path / "build").mkdir()
     shutil.copy(native3_fmu, tmp_path / "build" / native3_fmu.name)
-    assert re.search(PRINTED[number], fresh(BLOCKS[number].replace("Hovercraft.fmu", native3_fmu.name)))
+    assert re.search(PRINTED[number], fresh(BLOCKS[number].replace("HovercraftNative.fmu", native3_fmu.name)))
 
 
 TOOLS = pages(NATIVE)["tools.html"]
