@@ -638,6 +638,7 @@ keep.end = ["speed"]
 """
 
 
+@pytest.mark.usefixtures("native_at_hand")
 def test_the_command(tmp_path: Path, shell: Shell) -> None:
     (tmp_path / "masses.toml").write_text(STUDY)
     printed = shell.ok("sweep", "masses.toml", "--workers", "1", "--plot", "masses.png")
@@ -652,6 +653,7 @@ def test_the_command(tmp_path: Path, shell: Shell) -> None:
     assert [shown[1], shown[9]] == [f"{min(speeds):.4g}", f"{max(speeds):.4g}"]
 
 
+@pytest.mark.usefixtures("native_at_hand")
 def test_what_is_wrong_is_one_clear_line(tmp_path: Path, shell: Shell) -> None:
     (tmp_path / "bad.toml").write_text(STUDY + "frob = 3\n")
     for arguments, message in (
