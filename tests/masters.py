@@ -14,12 +14,12 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
+from hovercraft_fmu.building.ssp import CRAFT, PARAMETERS, PILOT, build_ssp
 from hovercraft_fmu.elsewhere import HostError, load_tbb, make_container, rows_of_module
 from hovercraft_fmu.fmu.description import xml
 from hovercraft_fmu.fmu.interface import HOVERCRAFT, STATES
 from hovercraft_fmu.fmu.variable import Model
 from hovercraft_fmu.scenes import VOYAGES
-from hovercraft_fmu.ssp import CRAFT, PARAMETERS, PILOT, build_ssp
 
 VOYAGE = VOYAGES["crosswind"]
 STEPS = 700

@@ -1,6 +1,8 @@
 """How the package is laid out: what a reader may rely on."""
 
+import ast
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,58 @@ import hovercraft_fmu
 from tests.conftest import Fresh
 
 PACKAGE = Path(hovercraft_fmu.__file__).parent
+FLOORS = (
+    ("_version", "model"),
+    ("fmu",),
+    ("autopilot", "scenes"),
+    ("building",),
+    ("host",),
+    ("simulation", "elsewhere"),
+    ("coupling", "cross_check"),
+    ("view",),
+    ("sweep", "validation", "examples"),
+    ("studies",),
+    ("cli",),
+)
+"""What imports only from floors above it in this table, never from beside it; __init__ is the door."""
+LEVELS = {name: level for level, names in enumerate(FLOORS) for name in names}
+
+
+def _rooms() -> set[str]:
+    """The modules and packages right below the package."""
+    paths = [path for path in PACKAGE.iterdir() if path.suffix == ".py" or any(path.glob("*.py"))]
+    return {path.stem for path in paths} - {"__init__"}
+
+
+def _imports(path: Path) -> Iterator[str]:
+    """The dotted names that a file imports, wherever in it; relative ones in full."""
+    package = ("hovercraft_fmu", *path.relative_to(PACKAGE).parts[:-1])
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            stem = package[: len(package) - node.level + 1] if node.level else ()
+            yield from (".".join((*stem, *filter(None, (node.module, alias.name)))) for alias in node.names)
+
+
+def test_every_room_has_a_floor() -> None:
+    assert sorted(LEVELS) == sorted(_rooms())
+
+
+@pytest.mark.parametrize("room", LEVELS)
+def test_imports_point_downward(room: str) -> None:
+    """All imports, also those within a function or for types alone."""
+    files = [PACKAGE / f"{room}.py", *(PACKAGE / room).rglob("*.py")]
+    wrong = [
+        f"{path.relative_to(PACKAGE)} imports {name}"
+        for path in files
+        if path.exists()
+        for name in _imports(path)
+        if name.startswith("hovercraft_fmu.")
+        and (other := name.split(".")[1]) != room
+        and LEVELS.get(other, -1) >= LEVELS[room]
+    ]
+    assert wrong == []
 
 
 def test_a_module_name_stands_once() -> None:

@@ -17,6 +17,7 @@ from lxml import etree
 from PIL import Image
 
 from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
+from hovercraft_fmu.building.ssp import build_ssp
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.coupling import (
     COLUMNS,
@@ -37,7 +38,6 @@ from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.model.integrators import integrator
 from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import VOYAGES, Voyage
-from hovercraft_fmu.ssp import build_ssp
 from hovercraft_fmu.studies import closed_loop as study
 from tests.conftest import FLAVOURS, FMI_2, ROOT
 from tests.masters import LOOPS, STEP, STEPS, VOYAGE, loop_in

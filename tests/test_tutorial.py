@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from hovercraft_fmu.building.ssp import build_ssp
 from hovercraft_fmu.elsewhere import HOSTS
 from hovercraft_fmu.fmu.description import NATIVE
 from hovercraft_fmu.fmu.document import pages
-from hovercraft_fmu.ssp import build_ssp
 from tests.conftest import Fresh
 
 PAGE = pages()["tutorial.html"]

@@ -11,15 +11,15 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple, TypeAlias, get_args
 from xml.etree.ElementTree import ParseError, fromstring
 
-from ._version import __version__
-from .autopilot.pilot_package import CONTENT as AUTOPILOT_CONTENT
-from .autopilot.pilot_package import build_autopilot
-from .fmu.block import guid
-from .fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
-from .fmu.machine_code import identity
-from .fmu.native_package import build_native_fmu
-from .fmu.python_package import build_fmu, hovercraft_content, python_identity
-from .fmu.start_values import Value, variant
+from .._version import __version__
+from ..autopilot.pilot_package import CONTENT as AUTOPILOT_CONTENT
+from ..autopilot.pilot_package import build_autopilot
+from ..fmu.block import guid
+from ..fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
+from ..fmu.machine_code import identity
+from ..fmu.native_package import build_native_fmu
+from ..fmu.python_package import build_fmu, hovercraft_content, python_identity
+from ..fmu.start_values import Value, variant
 from .ssp import build_ssp
 
 Kind: TypeAlias = Literal["native", "native3", "python", "autopilot", "native_loop", "native3_loop", "python_loop"]

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
-from ._version import RELEASE_DATE, __version__
-from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
-from .fmu.archive import write_archive, zipped
-from .fmu.description import AUTHOR, xml
-from .fmu.interface import HOVERCRAFT, STATES
-from .fmu.variable import Variable
-from .scenes import VOYAGES, Voyage
+from .._version import RELEASE_DATE, __version__
+from ..autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
+from ..fmu.archive import write_archive, zipped
+from ..fmu.description import AUTHOR, xml
+from ..fmu.interface import HOVERCRAFT, STATES
+from ..fmu.variable import Variable
+from ..scenes import VOYAGES, Voyage
 
 CRAFT, PILOT = "hovercraft", "autopilot"
 """The names of the components."""
