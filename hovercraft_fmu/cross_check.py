@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ._version import __version__
 from .fmu.description import NATIVE
-from .fmu.interface import INPUTS, VARIABLES
+from .fmu.interface import INPUTS, OUTPUTS
 from .fmu.native_package import build_native_fmu
 from .scenes import scene
 from .simulation import simulate
@@ -17,7 +17,6 @@ from .simulation import simulate
 SCENE = "slalom"
 """Starts at rest with all start values as they are; its inputs are continuous."""
 PLATFORMS = ("linux64", "win64", "darwin64")
-OUTPUTS = tuple(variable.name for variable in VARIABLES if variable.causality == "output")
 README = """\
 {name}: a hovercraft that moves in the plane, FMI 2.0 co-simulation, made by hovercraft-fmu {version}.
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, HOSTS, INPUT_REFERENCES, OUTPUTS, hosts_of
-from hovercraft_fmu.fmu.interface import HOVERCRAFT, VARIABLES
+from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, HOSTS, INPUT_REFERENCES, hosts_of
+from hovercraft_fmu.fmu.interface import HOVERCRAFT, OUTPUTS, VARIABLES
 from hovercraft_fmu.model.integrators import integrator_number
 from hovercraft_fmu.simulation import plan
 from hovercraft_fmu.sweep.study import read_study
@@ -135,8 +135,8 @@ print("\\n" + json.dumps(rows))
 """
 ECOS = """
 import json, sys
-from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, OUTPUTS, load_tbb
-from hovercraft_fmu.fmu.interface import INPUTS
+from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, load_tbb
+from hovercraft_fmu.fmu.interface import INPUTS, OUTPUTS
 
 load_tbb()
 from ecospy import EcosSimulation, EcosSimulationStructure

@@ -18,12 +18,11 @@ from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES, STEP_TURNS, STEP_UNSTABLE
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
-from hovercraft_fmu.model.integrators import INTEGRATORS, MIN_STEP, StepTooSmallError, integrator_number
+from hovercraft_fmu.model.integrators import INTEGRATORS, MIN_STEP, StepTooSmallError, integrator, integrator_number
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, stability_number
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.studies.extremes import (
     ACCURATE,
-    ADAPTIVE,
     FAILED,
     FIXED,
     SAMPLINGS,
@@ -37,7 +36,6 @@ from hovercraft_fmu.studies.extremes import (
     measure_extremes,
     sample,
     shares,
-    single,
 )
 from hovercraft_fmu.studies.stability import QUALITIES, THEORY, Motion, largest_step, motions
 from tests.lowlevel import another, count, get, one, reference
@@ -152,6 +150,12 @@ def test_the_quick_study_finds_what_is_committed(tmp_path: Path) -> None:
     assert (tmp_path / "stability.png").read_bytes().startswith(b"\x89PNG")
 
 
+def single(batch: Batch, i: int) -> tuple[Craft, Controls, State, float]:
+    """One of the runs, in plain numbers, and its sub-step [s]."""
+    held, at = ([float(value) for value in np.array(values)[:, i]] for values in (batch.controls, batch.start))
+    return batch.craft.one(i), Controls(*held), State(*at), float(batch.h[i])
+
+
 TOLERANCE = 1e-5
 OWN_TIMES = 4
 """Times the sampled step: how long a run of the adaptive method lasts."""
@@ -165,10 +169,10 @@ def test_the_adaptive_method_meets_its_tolerance_or_says_that_it_cannot() -> Non
     drawn, tight = sample(np.random.default_rng(5), 1000, OWN_TIMES, list(SAMPLINGS)[1]), 0
     refused = 0
     for i in range(1000):
-        craft, controls, start, first, _ = single(drawn, i)
+        craft, controls, start, first = single(drawn, i)
         try:
             coarse, fine = (
-                advance(start, controls, craft, OWN_TIMES * first, Settings(first, ADAPTIVE, tolerance))
+                advance(start, controls, craft, OWN_TIMES * first, Settings(first, integrator(4), tolerance))
                 for tolerance in (TOLERANCE, 1e-3 * TOLERANCE)
             )
         except (StepTooSmallError, NonFiniteError):
@@ -206,9 +210,9 @@ def test_the_adaptive_method_takes_any_first_step(motion: Motion, x: float) -> N
     slow = np.flatnonzero(motion.crafts.h > 1e4 * MIN_STEP)
     assert len(slow) >= 3
     for i in slow:
-        craft, controls, start, unit, _ = single(motion.crafts, int(i))
+        craft, controls, start, unit = single(motion.crafts, int(i))
         scale = motion.speed(start, craft)
-        way = Settings(x * unit, ADAPTIVE, 1e-9 * float(abs(scale)))
+        way = Settings(x * unit, integrator(4), 1e-9 * float(abs(scale)))
         state, proposed, gaps = State(*(motion.near * value for value in start)), 0.0, [1.0]
         for _ in range(UNITS):
             stretch = advance(state, controls, craft, unit, way, proposed=proposed)
@@ -241,7 +245,7 @@ def on_the_fmu(instances: list[Any], method: Any, runs: Batch, i: int) -> tuple[
     """The warnings, the end (None: a step was refused) and what was watched, of run i."""
     instance = instances[-1]
     instance.reset()
-    craft, controls, begin, h, _ = single(runs, i)
+    craft, controls, begin, h = single(runs, i)
     values: dict[str, Any] = {name: getattr(craft, name) for name in CRAFT_PARAMETERS}
     area = values.pop("drag_area")
     values |= dict(zip((*STATES, *INPUTS), (*begin, *controls), strict=True))

@@ -20,7 +20,7 @@ from hovercraft_fmu import build, elsewhere
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu.block import HEAD, MARK, Block, block, checksum, patched
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
-from hovercraft_fmu.fmu.interface import HOVERCRAFT
+from hovercraft_fmu.fmu.interface import HOVERCRAFT, OUTPUTS
 from hovercraft_fmu.fmu.machine_code import C_FOLDER, PLATFORMS, block_of, identity, library
 from hovercraft_fmu.fmu.native_package import build_native_fmu
 from hovercraft_fmu.fmu.python_package import build_fmu
@@ -109,7 +109,7 @@ def test_every_host_runs_its_start_values(host: str, ice: Path, each_fmu: Path) 
         for k, controls in enumerate(elsewhere.CONTROLS):
             instance.setReal(elsewhere.INPUT_REFERENCES, controls)
             instance.doStep(k * elsewhere.COMMUNICATION_STEP, elsewhere.COMMUNICATION_STEP)
-            expected.append(get(instance, *elsewhere.OUTPUTS))
+            expected.append(get(instance, *OUTPUTS))
     assert elsewhere.run_in(host, ice) == expected
 
 

@@ -16,14 +16,13 @@ from typing import NamedTuple
 
 import fmpy
 
-from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
+from ..fmu.interface import BY_NAME, INPUTS, OUTPUTS
 from ..host import Fmu
 
 COMMUNICATION_STEP = 0.1
 """s"""
 CONTROLS = [(10.0, 0.0, 0.0, 0.0, 0.0)] * 5 + [(10.0, 1.0, 0.0, 0.0, 0.1)] * 10 + [(2.5, 0.0, 0.25, -0.2, 0.0)] * 10
 """One row a communication step, in the order of INPUTS."""
-OUTPUTS = tuple(variable.name for variable in VARIABLES if variable.causality == "output")
 INPUT_REFERENCES = [BY_NAME[name].reference for name in INPUTS]
 OUTPUT_REFERENCES = [BY_NAME[name].reference for name in OUTPUTS]
 COMPILERS = ("cc", "gcc", "clang")

@@ -166,6 +166,7 @@ INPUTS = ("thrust", "port_thruster", "starboard_thruster", "wind.x", "wind.y")
 """In the order of Controls."""
 STATES = ("pose.x", "pose.y", "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
 """In the order of State."""
+OUTPUTS = tuple(v.name for v in VARIABLES if v.causality == "output")
 DERIVATIVES = tuple(v.name for state in STATES for v in VARIABLES if v.derivative_of == state)
 """Of the states, in their order."""
 CRAFT_PARAMETERS = tuple(v.name for v in VARIABLES if v.name in Craft.__dataclass_fields__)

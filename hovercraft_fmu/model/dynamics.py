@@ -316,11 +316,6 @@ def _loads_at_rest(state: State, controls: Controls, craft: Craft) -> Loads:
     return Loads(craft.mass * ax, craft.mass * ay, craft.inertia * turning)
 
 
-def drag_per_speed(state: State, controls: Controls, craft: Craft) -> float:
-    """k*q [kg/s]: the drag per air speed of the centre of drag."""
-    return load_function(controls, craft)(*state[2:])[3]
-
-
 def derivatives(state: State, controls: Controls, craft: Craft) -> Derivatives:
     """The equations of motion: m*dv/dt = force, I*dr/dt = moment, d(pose)/dt = velocity (Newton, Euler)."""
     force_x, force_y, moment = loads(state, controls, craft)

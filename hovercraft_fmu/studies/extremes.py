@@ -10,7 +10,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from ..host.fleet import Crafts, advance_fleet, observe_fleet
-from ..model.craft import DIRECTIONAL, Craft
+from ..model.craft import DIRECTIONAL
 from ..model.dynamics import Controls, State, friction_radius
 from ..model.integrators import INTEGRATORS, Integrator
 from ..model.subcycling import Settings
@@ -23,7 +23,6 @@ Mask: TypeAlias = Any
 
 FIXED = tuple(method for method in INTEGRATORS if method.integrate)
 """The methods with a fixed step."""
-ADAPTIVE = next(method for method in INTEGRATORS if not method.integrate)
 
 
 class Batch(NamedTuple):
@@ -54,49 +53,23 @@ def chosen(batch: Batch, which: Any) -> Batch:
     return Batch(craft.some(which), Controls(*held), State(*at), h[which], substeps)
 
 
-class Drawn(NamedTuple):
-    """One run, in plain numbers."""
+def advanced(batch: Batch, method: Integrator, state: State, n: int, refined: int = 1) -> tuple[State, Array, Array]:
+    """Every craft n sub-steps after a state, each cut into so many; drag mass [kg], rotation [rad].
 
-    craft: Craft
-    controls: Controls
-    start: State
-    h: float
-    """s"""
-    substeps: int
-
-
-def single(batch: Batch, i: int) -> Drawn:
-    """One of the runs."""
-    held, at = ([value[i].item() for value in cast(Any, values)] for values in (batch.controls, batch.start))
-    return Drawn(batch.craft.one(i), Controls(*held), State(*at), batch.h[i].item(), batch.substeps)
-
-
-class Reached(NamedTuple):
-    """What a number of sub-steps made of a batch; NaN where a motion left the numbers."""
-
-    state: State
-    drag_mass: Array
-    """kg"""
-    rotation: Array
-    """rad"""
-
-
-def advanced(batch: Batch, method: Integrator, state: State, n: int, refined: int = 1) -> Reached:
-    """Every craft of the batch n sub-steps after a state, each cut into so many; motions may leave the numbers."""
+    NaN where a motion left the numbers.
+    """
     h = batch.h / refined
     fleet = advance_fleet(state, batch.controls, batch.craft, h * (n * refined), Settings(h, method))
     lost = fleet.refused.numbers
     for values in (*fleet.states, fleet.drag_mass, fleet.rotation):
         values[lost] = np.nan
-    return Reached(State(*fleet.states), fleet.drag_mass, fleet.rotation)
+    return State(*fleet.states), fleet.drag_mass, fleet.rotation
 
 
-def actuation(batch: Batch) -> tuple[Array, Array, Array]:
-    """Thrust [N], side force [N] and moment [N.m] of the thrusters, after saturation."""
-    controls, craft = batch.controls, batch.craft
-    thrust = np.clip(controls.thrust, craft.thrust_min, craft.thrust_max)
-    command = np.clip(controls.port, 0.0, 1.0) - np.clip(controls.starboard, 0.0, 1.0)
-    return thrust, craft.steering_force * command, craft.thruster_moment * command
+def pushes(batch: Batch) -> tuple[Array, Array, Array]:
+    """Thrust [N], side force [N] and moment [N.m] of the thrusters: what is drawn is inside its limits."""
+    command = batch.controls.port - batch.controls.starboard
+    return batch.controls.thrust, batch.craft.steering_force * command, batch.craft.thruster_moment * command
 
 
 # ---- the numbers of the study
@@ -121,7 +94,7 @@ ROUNDING = 1e-11
 
 def own_steps(rng: np.random.Generator, runs: Batch) -> Array:
     """s: 1e-5 to 3 times the time in which the craft's motion changes, at most 10 s."""
-    thrust, side, turn = actuation(runs)
+    thrust, side, turn = pushes(runs)
     craft, k = runs.craft, runs.craft.drag_factor
     force = np.abs(thrust) + np.abs(side) + np.abs(turn / craft.length)
     # drag at the speed of the start and at the terminal speed, rotation now and by the thrusters
@@ -198,10 +171,9 @@ def watched(runs: Batch, method: Integrator) -> Numbers:
     finite = np.ones(h.shape, bool)
     with np.errstate(all="ignore"):
         for _ in range(runs.substeps):
-            stretch = advanced(runs, method, state, 1)
-            state = stretch.state
-            sigma = np.fmax(sigma, stretch.drag_mass * craft.drag_rate + stretch.rotation * craft.spin_rate)
-            drag, rho = np.fmax(drag, stretch.drag_mass), np.fmax(rho, stretch.rotation)
+            state, drag_mass, rotation = advanced(runs, method, state, 1)
+            sigma = np.fmax(sigma, drag_mass * craft.drag_rate + rotation * craft.spin_rate)
+            drag, rho = np.fmax(drag, drag_mass), np.fmax(rho, rotation)
             speed = np.fmax(speed, _size(state.vx, state.vy, state.yaw_rate, craft))
             finite &= np.isfinite(np.sum(state, axis=0))
         alpha, phi = _per(_gain(runs), speed), _per(_grip(runs), speed)
@@ -211,7 +183,7 @@ def watched(runs: Batch, method: Integrator) -> Numbers:
 def _swing(runs: Batch, drag: Array) -> Array:
     """1: tau, from the largest h*k*q [kg]; k*q^2 = (k*q)^2/k, and without drag nothing."""
     craft, k = runs.craft, runs.craft.drag_factor
-    turn = np.abs(actuation(runs)[2])
+    turn = np.abs(pushes(runs)[2])
     least = np.where(craft.drag_area == DIRECTIONAL, np.fmin(craft.drag_factor_ahead, craft.drag_factor_abeam), k)
     pressure = np.divide(drag * drag, least, out=np.zeros_like(drag), where=k > 0.0)
     return (np.abs(craft.drag_center) * pressure + runs.h * runs.h * turn) / craft.inertia
@@ -224,7 +196,7 @@ def _size(vx: Any, vy: Any, yaw_rate: Any, craft: Crafts) -> Array:
 
 def _gain(runs: Batch) -> Array:
     """m/s: what thrust and thrusters add to the speed in a sub-step."""
-    thrust, side, turn = actuation(runs)
+    thrust, side, turn = pushes(runs)
     craft = runs.craft
     return runs.h * _size(thrust / craft.mass, side / craft.mass, turn / craft.inertia, craft)
 
@@ -302,7 +274,7 @@ def judge(runs: Batch, methods: Iterable[Integrator] = FIXED) -> dict[str, Judge
     calm = {m: n.finite & (n.sigma <= m.stability_limit) & (n.rho <= m.rotation_limit) for m, n in seen.items()}
     needed = np.flatnonzero(np.any([calm[m] & (seen[m].sigma <= NO_REFERENCE) for m in calm], axis=0))
     some = chosen(runs, needed)
-    near, reference = (advanced(some, RK4, some.start, some.substeps, fine).state for fine in (REFINED, CHECKED))
+    near, reference = (advanced(some, RK4, some.start, some.substeps, fine)[0] for fine in (REFINED, CHECKED))
     doubt = _difference(near, reference, some.craft)
     judged = {}
     for method, numbers in seen.items():

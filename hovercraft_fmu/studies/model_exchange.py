@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import polars as pl
 
-from ..fmu.interface import INPUTS, STATES
+from ..fmu.interface import INPUTS, OUTPUTS, STATES
 from ..host import Instance, Port, SimulationError
 from ..model.dynamics import Controls, State
 from ..scenes import SCENES, Row, Scene
 from ..simulation import method_in_words, plan
 from .laboratory import Findings, Ready, Shown, Tell, interleaved
 from .reference_end import reference_end
-from .work_precision import OUTPUTS, STOP_TIME, Reached, Setting, fitted, largest, settings
+from .work_precision import STOP_TIME, Reached, Setting, fitted, largest, settings
 
 COMMUNICATION_STEP = 0.5
 """s: how often inputs are set and outputs are read; where the inputs of a scene bend or jump, too."""

@@ -117,7 +117,7 @@ class Motion(NamedTuple):
         lanes = lanes._replace(start=_times(start, lanes.start), h=x.ravel() * lanes.h)
         state = lanes.start
         for n in parts:
-            state = advanced(lanes, method, state, n).state
+            state = advanced(lanes, method, state, n)[0]
             yield (self.speed(state, lanes.craft) / scale).reshape(x.shape)
 
     def gap(self, speed: Any) -> Any:

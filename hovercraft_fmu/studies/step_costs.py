@@ -13,7 +13,7 @@ import polars as pl
 
 from ..elsewhere import COMPILERS, compiler
 from ..fmu.description import NATIVE
-from ..fmu.interface import INPUTS
+from ..fmu.interface import INPUTS, OUTPUTS
 from ..fmu.machine_code import headers, sources
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
@@ -24,7 +24,6 @@ from ..model.dynamics import Controls, State, actuation
 from ..model.integrators import INTEGRATORS
 from ..model.subcycling import Settings, advance
 from .laboratory import Findings, Ready, Shown, Tell, Timed, interleaved, spread
-from .work_precision import OUTPUTS
 
 STEP_SIZE = 0.001
 """s"""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 import polars as pl
 
-from ..fmu.interface import INPUTS, STATES, VARIABLES
+from ..fmu.interface import INPUTS, OUTPUTS, STATES
 from ..host import Instance
 from ..model.dynamics import Controls, State, windy
 from ..model.subcycling import advance
@@ -43,7 +43,6 @@ ORDER_SCENES = ("launch", "cycloid", "turn", "crosswind", "stop", "drift_to_rest
 ROUNDS = 3
 DECADES = tuple(10.0**-k for k in range(10))
 """m"""
-OUTPUTS = tuple(variable.name for variable in VARIABLES if variable.causality == "output")
 
 Points: TypeAlias = Sequence[tuple[float, float, Controls]]
 """(start, end) [s] of every communication step, and the controls that hold in it."""
