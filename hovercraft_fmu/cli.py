@@ -30,7 +30,7 @@ from rich.text import Text
 
 from ._version import __version__
 from .model.craft import PRESETS
-from .studies import STUDIES, carry_out
+from .studies import MEASUREMENTS, carry_out
 from .view.operator import PRESET, TIME_SCALE
 from .view.tables import markdown
 
@@ -331,15 +331,15 @@ def _demo_of_the_loop(fmu: Path, autopilot: Path, picture: Path) -> None:
 
 MEASURE = """Measure the product: what speed costs, what accuracy costs, where the methods break.
 
-NAME is one of the studies; what each takes is on a machine with nothing else to do:
+NAME is one of these; what each takes is on a machine with nothing else to do:
 
 \b
 """
-MEASURE += "\n".join(f"  {name:12} {study.what} ({study.takes})" for name, study in STUDIES.items())
+MEASURE += "\n".join(f"  {name:12} {each.what} ({each.takes})" for name, each in MEASUREMENTS.items())
 
 
 @commands.command(help=MEASURE)
-@click.argument("name", metavar="NAME", type=click.Choice(list(STUDIES)))
+@click.argument("name", metavar="NAME", type=click.Choice(list(MEASUREMENTS)))
 @click.option("--quick", is_flag=True, help="Fewer cases: below half a minute.")
 @click.option(
     "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Default: build/measure/NAME."

@@ -16,7 +16,7 @@ from rich.table import Table
 from hovercraft_fmu.cli import OUTPUT
 from hovercraft_fmu.fmu.archive import zipped
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.studies import STUDIES
+from hovercraft_fmu.studies import MEASUREMENTS
 from tests.conftest import FMI_2
 from tests.shell import Shell
 
@@ -172,7 +172,7 @@ def test_what_is_wrong_is_one_clear_line(shell: Shell, arguments: tuple[str, ...
 HIDDEN = {
     "matplotlib": (("simulate", "--stop-time", "1", "--plot", "a.png"), "[plot]"),
     "matplotlib of an animation": (("simulate", "--stop-time", "1", "--animate", "a.gif"), "[plot]"),
-    "matplotlib of a study": (("measure", "stability"), "[studies]"),
+    "matplotlib of a measurement": (("measure", "stability"), "[studies]"),
     "matplotlib of the demo": (("demo",), "[plot]"),
     "plotly": (("simulate", "--stop-time", "1", "--animate", "a.html"), "[html]"),
     "pyarrow": (("sweep", "turning_circle"), "[sweep]"),
@@ -195,7 +195,7 @@ def test_what_is_not_installed_is_named(name: str, tmp_path: Path) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_the_studies_are_listed_with_what_they_take(shell: Shell) -> None:
+def test_the_measurements_are_listed_with_what_they_take(shell: Shell) -> None:
     printed = shell.ok("measure", "--help")
-    for name, study in STUDIES.items():
-        assert re.search(rf"^ +{name} .*\({study.takes}\)$", printed, re.MULTILINE)
+    for name, each in MEASUREMENTS.items():
+        assert re.search(rf"^ +{name} .*\({each.takes}\)$", printed, re.MULTILINE)

@@ -1,6 +1,7 @@
 """Many craft at once: each with the bits of the kernel that the native FMU has, whatever its neighbours do."""
 
 import math
+import sys
 import threading
 from dataclasses import astuple, replace
 from pathlib import Path
@@ -252,6 +253,13 @@ def test_the_cloud_of_ten_thousand(tmp_path: Path, capsys: pytest.CaptureFixture
     cloud.main(tmp_path / "cloud.png")
     assert "10000 craft" in capsys.readouterr().out
     assert (tmp_path / "cloud.png").stat().st_size > 20000
+
+
+def test_the_cloud_is_refused_before_the_fleet_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    monkeypatch.delattr(cloud, "advance_fleet")
+    with pytest.raises(ModuleNotFoundError, match=r"pictures need matplotlib.*pip install 'hovercraft-fmu\[plot\]'"):
+        cloud.main(tmp_path / "cloud.png")
 
 
 def test_constants_are_in_the_order_of_the_craft() -> None:

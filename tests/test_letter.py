@@ -17,7 +17,7 @@ from hovercraft_fmu.autopilot.pilot_package import AUTOPILOT
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour, model_description, xml
 from hovercraft_fmu.fmu.extras import RESULT, terminals
 from hovercraft_fmu.fmu.interface import BY_NAME, HOVERCRAFT, STATES
-from hovercraft_fmu.studies.pages import reference_result
+from hovercraft_fmu.studies.pages import default_result
 from tests.lowlevel import one
 
 FLAVOURS = [PYTHON, NATIVE, NATIVE3, AUTOPILOT]
@@ -225,4 +225,4 @@ def test_the_reference_result_is_that_of_the_default_experiment(each_fmu: Path) 
     assert all(manifest.get(f"{spaced}fmi-ls-{each}") for each in ("version", "description"))
     assert (related.get("role"), related.get("type")) == ("result", "text/csv")
     assert related.get("source") == f"{identifier}_out.csv"
-    assert result == RESULT.read_bytes() == reference_result(each_fmu)
+    assert result == RESULT.read_bytes() == default_result(each_fmu)

@@ -657,7 +657,8 @@ def test_the_command(tmp_path: Path, shell: Shell) -> None:
 def test_what_is_wrong_is_one_clear_line(tmp_path: Path, shell: Shell) -> None:
     (tmp_path / "bad.toml").write_text(STUDY + "frob = 3\n")
     for arguments, message in (
-        (("nix.toml",), "nix.toml: No such file or directory"),
+        (("nix.toml",), "study = 'nix.toml': must be a TOML file, or one of turning_circle"),
+        (("NOSUCH",), "study = 'NOSUCH': must be a TOML file, or one of turning_circle"),
         (("bad.toml",), "bad.toml: frob = 3: the key must be one of scene"),
         ((), "Missing argument 'STUDY'"),
         (("turning_circle", "nix.fmu"), "nix.fmu: no such FMU"),

@@ -31,7 +31,7 @@ from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.studies.reference_end import reference_end
 from hovercraft_fmu.studies.scene_terms import SHOWN, TERMS
-from hovercraft_fmu.studies.work_precision import Setting, end_error
+from hovercraft_fmu.studies.work_precision import Setting, largest, reached
 from tests.conftest import ROOT
 from tests.strategies import calm_controls, calm_crafts, controls, numbers, states
 from tests.test_trade import RESULTS, records
@@ -300,13 +300,13 @@ def test_what_friction_does_to_the_order() -> None:
     for name, steps in (("semi_implicit_euler", (0.05, 0.025, 0.0125, 0.00625)),
                         ("drag_implicit", (0.05, 0.025, 0.0125, 0.00625)),
                         ("rk4", (0.0625, 0.03125, 0.015625, 0.0078125))):  # fmt: skip
-        errors = [end_error(scene, Setting(name, h, 0.5), exact) for h in steps]
+        errors = [largest(reached(scene, Setting(name, h, 0.5)).end, exact) for h in steps]
         orders[name] = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
     assert orders["semi_implicit_euler"] == pytest.approx(1.0, abs=0.1)
     assert orders["drag_implicit"] == pytest.approx(1.0, abs=0.1)
     assert orders["rk4"] == pytest.approx(2.0, abs=0.2)
     for tolerance in (1e-4, 1e-6, 1e-8):
-        assert end_error(scene, Setting("adaptive", 0.01, 0.5, tolerance), exact) < 10.0 * tolerance
+        assert largest(reached(scene, Setting("adaptive", 0.01, 0.5, tolerance)).end, exact) < 10.0 * tolerance
 
 
 def test_sliding_alone_rk4_keeps_its_order() -> None:

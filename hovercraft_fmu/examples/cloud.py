@@ -9,7 +9,8 @@ from hovercraft_fmu import Crafts, advance_fleet
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator_number
 from hovercraft_fmu.model.subcycling import Settings
-from hovercraft_fmu.view.plots import new_figure
+from hovercraft_fmu.view.palette import SHADES
+from hovercraft_fmu.view.plots import check_plot, new_figure
 
 COUNT, SECONDS = 10_000, 60
 RK4 = Settings(step_size=0.1, integrator=INTEGRATORS[integrator_number("rk4") - 1])
@@ -17,6 +18,7 @@ RK4 = Settings(step_size=0.1, integrator=INTEGRATORS[integrator_number("rk4") - 
 
 def main(path: Path) -> None:
     """Write the picture."""
+    check_plot(path)
     dice = np.random.default_rng(1)
     crafts = Crafts(mass=dice.normal(100.0, 10.0, COUNT), air_density=0.0023769)
     states = np.zeros((len(State._fields), COUNT))
@@ -29,7 +31,7 @@ def main(path: Path) -> None:
             print(f"craft {number}: {why}")
     figure = new_figure(figsize=(6.0, 6.0), dpi=110, layout="constrained")
     axes = figure.subplots()
-    axes.scatter(states[0], states[1], c=np.hypot(states[3], states[4]), s=1.0)
+    axes.scatter(states[0], states[1], c=np.hypot(states[3], states[4]), s=1.0, cmap=SHADES)
     axes.set(title=f"{COUNT} craft after {SECONDS} s", xlabel="x [m]", ylabel="y [m], down", aspect="equal")
     axes.invert_yaxis()
     figure.savefig(path)

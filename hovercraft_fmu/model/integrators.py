@@ -227,7 +227,7 @@ def _rk4(acceleration_at: LoadFunction, state: State, h: float, n: int) -> Stret
 
 # Dormand, Prince: A family of embedded Runge-Kutta formulae (1980), the pair 5(4) with 7 stages; the last is the fifth
 # order step itself, and the first of the next.
-STAGES = (
+TABLEAU = (
     (1 / 5,),
     (3 / 40, 9 / 40),
     (44 / 45, -56 / 15, 32 / 9),
@@ -352,7 +352,7 @@ def _dormand_prince(
 ) -> tuple[Vector, Rates, float]:
     """One step: the new state, the rates there, and the largest component of the error estimate."""
     stages = [first]
-    for row in STAGES:
+    for row in TABLEAU:
         new = tuple([value + h * _combined(row, stages, i) for i, value in enumerate(y)])
         rates = rates_at(new)
         stages.append(rates[0])
@@ -375,6 +375,8 @@ class Integrator(NamedTuple):
     description: str
     integrate: Integrate | None
     """None for the adaptive method, which cuts the time itself."""
+    stages: int
+    """How many times a sub-step works out the loads; of adaptive, one that is taken."""
     stability_limit: float
     """1: the largest sub-step times the fastest linearized drag rate up to which answers can be trusted."""
     rotation_limit: float
@@ -386,6 +388,7 @@ INTEGRATORS = (
         "semi_implicit_euler",
         "Semi-implicit (symplectic) Euler: first order; the pose from the new velocity",
         semi_implicit_euler,
+        1,
         2.0,
         0.5,
     ),
@@ -393,14 +396,16 @@ INTEGRATORS = (
         "drag_implicit",
         "Drag solved implicitly with its factor from the start of the sub-step: first order, stable at any step",
         drag_implicit,
+        1,
         2.0,  # it never diverges, but under thrust it overshoots above
         0.5,
     ),
-    Integrator("rk4", "The classic Runge-Kutta method: fourth order", rk4, 2.785, 0.5),
+    Integrator("rk4", "The classic Runge-Kutta method: fourth order", rk4, 4, 2.785, 0.5),
     Integrator(
         "adaptive",
         "Dormand-Prince 5(4) with steps that meet the tolerance; step_size is the first one",
         None,
+        6,
         math.inf,
         math.inf,
     ),

@@ -1,4 +1,4 @@
-"""What speed costs, what accuracy costs, where the methods break: the studies, and the laboratory that makes them."""
+"""What speed costs, what accuracy costs, where the methods break: the laboratory and its measurements."""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -8,8 +8,8 @@ from typing import NamedTuple
 NEEDED = ("matplotlib", "polars", "scipy")
 
 
-class Study(NamedTuple):
-    """One of the studies; its module has a function `study(quick, tell)`."""
+class Measurement(NamedTuple):
+    """Its module has a function `measure(quick, tell)`."""
 
     module: str
     what: str
@@ -17,43 +17,43 @@ class Study(NamedTuple):
     """How long, usually; with --quick below half a minute."""
 
 
-STUDIES: Mapping[str, Study] = {
-    "trade": Study("trade", "methods, steps and communication steps over the scenes; a host's solver", "10 minutes"),
-    "stability": Study("stability", "where each method breaks: limits of the step; random extremes", "2 minutes"),
-    "scene-terms": Study("scene_terms", "what each opt-in term costs, and what leaving it out does", "3 minutes"),
-    "coupling": Study("closed_loop", "what the communication step of the closed loop costs", "1 minute"),
-    "step-costs": Study("step_costs", "a sub-step and a host's calls: native FMU, Python FMU, bare model", "1 minute"),
-    "sweeps": Study("sweep_costs", "a run of a sweep, beside fmpy's own way", "10 minutes"),
+MEASUREMENTS: Mapping[str, Measurement] = {
+    "trade": Measurement("trade", "methods, steps, communication steps over the scenes; a host's solver", "10 minutes"),
+    "stability": Measurement("stability", "where each method breaks: limits of the step; random extremes", "2 minutes"),
+    "scene-terms": Measurement("scene_terms", "what each opt-in term costs, and what leaving it out does", "3 minutes"),
+    "coupling": Measurement("closed_loop", "what the communication step of the closed loop costs", "1 minute"),
+    "step-costs": Measurement("step_costs", "a sub-step, a host's calls: native, Python FMU, bare model", "1 minute"),
+    "sweeps": Measurement("sweep_costs", "a run of a sweep, beside fmpy's own way", "10 minutes"),
 }
 
 
 def carry_out(name: str, quick: bool, folder: Path, tell: Callable[[float], None] = lambda _: None) -> str:
-    """Make a study, write its tables and pictures into the folder, and return what is to be printed.
+    """Make a measurement, write its tables and pictures into the folder, and return what is to be printed.
 
     Args:
-        name: one of STUDIES.
+        name: one of MEASUREMENTS.
         quick: fewer cases, below half a minute.
         folder: is made where it is not there.
         tell: called with the part of the work that is done, 0 to 1.
 
     Raises:
-        ValueError: no such study.
+        ValueError: no such measurement.
         ModuleNotFoundError: what it needs is not installed; says how to install it.
         OSError: a file cannot be written; a program that is measured failed.
     """
-    if name not in STUDIES:
-        raise ValueError(f"study = {name!r}: must be one of {', '.join(STUDIES)}")
+    if name not in MEASUREMENTS:
+        raise ValueError(f"measurement = {name!r}: must be one of {', '.join(MEASUREMENTS)}")
     try:
         for package in NEEDED:  # what draws is imported late: it is to be missed before the work
             importlib.import_module(package)
-        module = importlib.import_module(f".{STUDIES[name].module}", __name__)
+        module = importlib.import_module(f".{MEASUREMENTS[name].module}", __name__)
     except ModuleNotFoundError as error:
         if not (error.name or "").startswith(NEEDED):
             raise
         raise ModuleNotFoundError(
-            f"studies need {error.name}, which is not installed: pip install 'hovercraft-fmu[studies]'"
+            f"measurements need {error.name}, which is not installed: pip install 'hovercraft-fmu[studies]'"
         ) from error
-    findings = module.study(quick, tell)
+    findings = module.measure(quick, tell)
     findings.write(folder)
     report: str = findings.report()
     return report

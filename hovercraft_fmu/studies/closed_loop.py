@@ -34,7 +34,7 @@ WHOLE_STEPS = (0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """s, for the whole course"""
 EXACT = Settings(0.05, integrator(3))
 """RK4: what is left is the coupling's error."""
-INTEGRATORS = {
+COMPARED = {
     "semi_implicit_euler, 0.001 s": Settings(0.001, integrator(1)),
     "semi_implicit_euler, 0.02 s": Settings(0.02, integrator(1)),
     "rk4, 0.1 s": Settings(0.1, integrator(3)),
@@ -86,7 +86,7 @@ def errors(steps: Sequence[float], exact: Path2, tell: Tell) -> pl.DataFrame:
     for done, step in enumerate(steps, 1):
         paths = {scheme: sampled(scheme, step) for scheme in SCHEMES}
         rows += [(scheme, step, _apart(path, exact)) for scheme, path in paths.items()]
-        for name, settings in INTEGRATORS.items():
+        for name, settings in COMPARED.items():
             if settings.step_size <= step:  # else it is the sub-step of EXACT, or another's
                 rows.append((name, step, _apart(sampled(JACOBI, step, settings), paths[JACOBI])))
         tell(done / len(steps))
@@ -112,7 +112,7 @@ def order(found: pl.DataFrame, error_of: str) -> float:
     return fitted(own["communication_step"], own["position_error"])
 
 
-def study(quick: bool, tell: Tell) -> Findings:
+def measure(quick: bool, tell: Tell) -> Findings:
     """The errors of a stretch and the whole course; quick: fewer communication steps."""
     exact, off = continuous()
     steps, whole = (STEPS[3:], WHOLE_STEPS[2:5]) if quick else (STEPS, WHOLE_STEPS)
@@ -140,7 +140,7 @@ def draw(found: pl.DataFrame) -> "Figure":
     figure = new_figure(figsize=(7.6, 4.8), dpi=110, layout="constrained")
     axes = figure.add_subplot()
     styles = {JACOBI: (INK, "P", "-"), GAUSS_SEIDEL: (OTHER, "v", "-")}
-    for (name, settings), line in zip(INTEGRATORS.items(), (":", "--", ":"), strict=True):
+    for (name, settings), line in zip(COMPARED.items(), (":", "--", ":"), strict=True):
         styles[name] = (*METHODS[settings.integrator.name], line)
     for name, (color, marker, line) in styles.items():
         own = found.filter(error_of=name)

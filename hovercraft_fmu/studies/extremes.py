@@ -72,7 +72,7 @@ def pushes(batch: Batch) -> tuple[Array, Array, Array]:
     return batch.controls.thrust, batch.craft.steering_force * command, batch.craft.thruster_moment * command
 
 
-# ---- the numbers of the study
+# ---- the numbers of the measurement
 
 FAILED, WARNED, ACCURATE, SILENT = range(4)
 """A number that is not finite; a limit of the method passed; within the formula; none of these, which must not be."""

@@ -1,4 +1,4 @@
-"""The laboratory: a table of cases, timed in turn; what a study found, shown and written.
+"""The laboratory: a table of cases, timed in turn; what a measurement found, shown and written.
 
 Tables are polars': one wheel that needs no other, with types of its own, and what it prints for a terminal is Markdown,
 so a page takes it as it is. (pandas would want two packages more for that.)
@@ -87,7 +87,7 @@ def machine() -> str:
     )
 
 
-# ---- what a study found
+# ---- what a measurement found
 
 
 class Shown(NamedTuple):
@@ -101,7 +101,7 @@ class Shown(NamedTuple):
 
 @dataclass
 class Findings:
-    """All that a study found."""
+    """All that a measurement found."""
 
     records: dict[str, pl.DataFrame] = field(default_factory=dict)
     """NAME.csv -> its table."""
@@ -111,7 +111,7 @@ class Findings:
     notes: list[str] = field(default_factory=list)
 
     def add(self, other: "Findings") -> None:
-        """What another part of the study found."""
+        """What another part of the measurement found."""
         self.records |= other.records
         self.tables += other.tables
         self.pictures |= other.pictures

@@ -14,7 +14,7 @@ from ..scenes import SCENES, Row, Scene
 from ..simulation import method_in_words, plan
 from .laboratory import Findings, Ready, Shown, Tell, interleaved
 from .reference_end import reference_end
-from .work_precision import STOP_TIME, Reached, Setting, fitted, largest, settings
+from .work_precision import STOP_TIME, Reached, Setting, fitted, largest, planned, settings
 
 COMMUNICATION_STEP = 0.5
 """s: how often inputs are set and outputs are read; where the inputs of a scene bend or jump, too."""
@@ -23,8 +23,6 @@ TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 ACCURACIES = (0.01, 1e-4, 1e-6)
 """m, at the end"""
 SMOOTH = tuple(scene for scene in SCENES.values() if not scene.craft.rubs)
-EVALUATIONS = {"semi_implicit_euler": 1, "drag_implicit": 1, "rk4": 4, "adaptive": 6}
-"""Of the loads, in a sub-step."""
 MOST_STEPS = 100_000
 """Of CVode's own, from one reading of the outputs to the next."""
 CVODE = "CVode"
@@ -139,11 +137,11 @@ def stepped(instance: Instance, scene: Scene, setting: Setting) -> Ready[Reached
     """A scene with one of the FMU's own methods; of the substeps, the evaluations."""
     inputs, outputs, states = _driven(instance, scene), instance.port(*OUTPUTS), instance.port(*STATES, "substeps")
     width = len(inputs.names)
-    values = {name: getattr(setting, name) for name in ("integrator", "step_size", "tolerance")}
+    run = planned(scene, setting)
 
     def ready() -> Callable[[], Reached]:
         instance.reset()
-        instance.start(plan(scene, start_values=values).start_values)
+        instance.start(run.start_values)
         return go
 
     def go() -> Reached:
@@ -157,7 +155,7 @@ def stepped(instance: Instance, scene: Scene, setting: Setting) -> Ready[Reached
                 time = point
                 outputs.get()
         *end, substeps = states.get()
-        return Reached(State(*end), int(substeps) * EVALUATIONS[setting.integrator])
+        return Reached(State(*end), int(substeps) * run.settings.integrator.stages)
 
     return ready
 

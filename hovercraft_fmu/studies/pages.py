@@ -115,13 +115,13 @@ def assemble(results: Path = RESULTS) -> list[Path]:
             if picture:
                 files[PACKED / name] = in_palette(picture, shown(name))
         files[pilot_package.HERE / pilot_package.PICTURE] = in_palette(Path(folder) / pilot_package.PICTURE, "")
-        files[RESULT] = reference_result(build_native_fmu(Path(folder) / "HovercraftNative.fmu"))
+        files[RESULT] = default_result(build_native_fmu(Path(folder) / "HovercraftNative.fmu"))
     for path, content in files.items():
         path.write_bytes(content)
     return sorted(files)
 
 
-def reference_result(fmu: Path) -> bytes:
+def default_result(fmu: Path) -> bytes:
     """The outputs of the default experiment, every second, as CSV; the shortest text that gives the same bits."""
     found = simulate_fmu(
         str(fmu), output_interval=HOVERCRAFT.communication_step, output=list(OUTPUTS), fmi_type="CoSimulation"

@@ -93,7 +93,7 @@ SHOWN = ("turn", "ice", "drift_to_rest")
 """Scenes in the short table."""
 
 
-def study(quick: bool, tell: Tell) -> Findings:
+def measure(quick: bool, tell: Tell) -> Findings:
     """Every term in every scene, with and without, at the default method; quick: three scenes, once.
 
     The time of the bare model with the term over that without; how far the end moves [m, rad]; the length of the path.

@@ -220,7 +220,7 @@ def measure_map(all_motions: Sequence[Motion], tell: Tell) -> pl.DataFrame:
 # ---- the study
 
 
-def study(quick: bool, tell: Tell) -> Findings:
+def measure(quick: bool, tell: Tell) -> Findings:
     """The limits, the extremes, and the picture of both; quick: two craft, straight ahead, and fewer runs."""
     whole = motions()
     if quick:

@@ -154,16 +154,16 @@ def evaluation_case(solving: Instance, loops: Loops) -> Cases:
     yield ("C host: set time and states, get derivatives", OURS), _started(solving, go, {})
 
 
-def load(path: Path) -> int:
+def load_and_free(path: Path) -> int:
     """A file opened, one instance, and both closed."""
     with Fmu(path) as fmu, fmu.instance():
         return 1
 
 
-# ---- the study
+# ---- the measurement
 
 
-def study(quick: bool, tell: Tell) -> Findings:
+def measure(quick: bool, tell: Tell) -> Findings:
     """All cases; quick: a quarter of the rounds. Without a C compiler those called by Python alone."""
     notes, loops = [], None
     with tempfile.TemporaryDirectory() as place:
@@ -179,7 +179,7 @@ def study(quick: bool, tell: Tell) -> Findings:
         ):  # fmt: skip
             cases = [*substep_cases(one, loops), *call_cases(OURS, one, loops), *call_cases(PYTHON, other, loops)]
             for whose, path in zip((OURS, PYTHON), paths, strict=True):
-                cases.append((("fmpy: extract, load, instantiate, free", whose), partial(partial, load, path)))
+                cases.append((("fmpy: extract, load, instantiate, free", whose), partial(partial, load_and_free, path)))
             cases += evaluation_case(solving, loops) if loops else []
             timed = interleaved(dict(cases), 5 if quick else ROUNDS, tell)
     found = compared(timed)

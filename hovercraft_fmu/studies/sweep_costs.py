@@ -62,7 +62,7 @@ def content(way: Way) -> dict[str, Any]:
     }
 
 
-def study(quick: bool, tell: Tell) -> Findings:
+def measure(quick: bool, tell: Tell) -> Findings:
     """All ways; quick: each with a hundred runs. Peaks [MB] of the process and of a worker; to_fmpy: times faster.
 
     Raises OSError where a process failed, with what it said.

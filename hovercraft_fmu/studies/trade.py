@@ -14,7 +14,7 @@ from .model_exchange import SMOOTH, exchanged
 from .work_precision import ADVISED_SCENE, ROUNDS, accuracy, advice, measured
 
 
-def study(quick: bool, tell: Tell) -> Findings:
+def measure(quick: bool, tell: Tell) -> Findings:
     """Every scene with every setting; quick: the scene that advice is given for, once."""
     scenes, smooth = ([SCENES[ADVISED_SCENE]],) * 2 if quick else (list(SCENES.values()), SMOOTH)
     rounds = 1 if quick else ROUNDS

@@ -217,11 +217,6 @@ def reached(scene: Scene, setting: Setting) -> Reached:
     return bare(run, list(schedule(run)))()()
 
 
-def end_error(scene: Scene, setting: Setting, exact: State) -> float:
-    """The largest component error at the end, SI units."""
-    return largest(reached(scene, setting).end, exact)
-
-
 def largest(end: State, exact: State) -> float:
     """The largest difference of a component, SI units."""
     return max(abs(a - b) for a, b in zip(end, exact, strict=True))
@@ -239,7 +234,7 @@ def observed_orders(scenes: Sequence[str] = ORDER_SCENES) -> pl.DataFrame:
     rows, exact = [], _exact(scenes)
     for scene, (name, factor) in itertools.product(scenes, ((EULER, 1.0), ("drag_implicit", 1.0), ("rk4", 5.0))):
         steps = [step * factor for step in ORDER_STEPS]
-        errors = [end_error(SCENES[scene], Setting(name, step, 0.5), exact[scene]) for step in steps]
+        errors = [largest(reached(SCENES[scene], Setting(name, step, 0.5)).end, exact[scene]) for step in steps]
         rows.append({"scene": scene, "integrator": name, "slope": fitted(steps, errors)})
     return pl.DataFrame(rows)
 

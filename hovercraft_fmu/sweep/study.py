@@ -124,6 +124,8 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
     if isinstance(source, Mapping):
         return _study(source, "study", Path())
     path = SHIPPED / f"{source}.toml" if str(source) in STUDIES else Path(source)
+    if not path.exists():
+        raise FileNotFoundError(f"study = {str(source)!r}: must be a TOML file, or one of {', '.join(STUDIES)}")
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:  # of TOML, or of the encoding

@@ -27,8 +27,6 @@ FRAME_TIME = 75
 """ms"""
 LAST_FRAME_TIME = 2000
 """ms"""
-STAGES = {"rk4": " of 4 stages", "adaptive": " of 6 stages"}
-"""So many times these work out the loads in a sub-step; the others once. (What adaptive refused is not counted.)"""
 LEGEND_LINE = 100
 """characters"""
 STRENGTHS = 8
@@ -121,7 +119,8 @@ def _names(results: Sequence[Result]) -> list[str]:
     for run, result in zip(runs, results, strict=True):
         setting = ", ".join([run.method, *(f"{name} {run.value(name):g}" for name in differ)])
         substeps = f"{result['substeps'][-1]:,} sub-steps".replace(",", " ")
-        names.append(f"{setting}: {substeps}{STAGES.get(run.settings.integrator.name, '')}")
+        stages = run.settings.integrator.stages
+        names.append(f"{setting}: {substeps}{f' of {stages} stages' if stages > 1 else ''}")
     return names
 
 

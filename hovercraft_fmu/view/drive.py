@@ -17,7 +17,7 @@ from ..model.dynamics import Controls, State
 from ..scenes import signals
 from ..simulation import Run, Stepper, plan, stepping
 from .operator import PRESET, TIME_SCALE, Action, Operator, Pace
-from .window import Shown, Window, pygame
+from .window import Frame, Window, pygame
 
 SLOWEST, FASTEST = 0.1, 1000.0
 FRAME_RATE = 60
@@ -273,12 +273,12 @@ class _Loop:
             scale = self._pace.scale * (2.0 if key in FASTER else 0.5)
             self._pace.rescale(min(max(scale, SLOWEST), FASTEST), self._clock.now())
 
-    def _shown(self) -> Shown:
+    def _shown(self) -> Frame:
         state = self._flight.state
         notes = [f"warning: {each}" for each in self._flight.warnings]
         if self._late:
             notes.append("this machine cannot keep up: the drive runs slower than asked (- halves it)")
-        return Shown(
+        return Frame(
             self._flight.time, (state.x, state.y, state.heading), self._flight.speed, self._flight.operator.controls,
             self._pace.scale, self._paused, self._help, notes,
         )  # fmt: skip

@@ -51,7 +51,7 @@ HELP = (
 HINT = "arrows drive   WASD wind   space pause   R reset   + - time   H help   Esc end"
 
 
-class Shown(NamedTuple):
+class Frame(NamedTuple):
     """What one frame shows."""
 
     time: float
@@ -118,7 +118,7 @@ class Window:
         """No trail."""
         self._trail.clear()
 
-    def draw(self, shown: Shown) -> None:
+    def draw(self, shown: Frame) -> None:
         """One frame, on the screen."""
         screen, camera = self._screen, self.camera
         screen.fill(PANEL)
@@ -156,7 +156,7 @@ class Window:
             for start, end in camera.copies([(x, y), (x + right, y + down)]):
                 pygame.draw.aaline(view, color, start, end, 2)
 
-    def _draw_craft(self, view: "pygame.Surface", camera: Camera, shown: Shown) -> None:
+    def _draw_craft(self, view: "pygame.Surface", camera: Camera, shown: Frame) -> None:
         for points in camera.copies(camera.body(shown.pose, outline(self._craft))):
             pygame.draw.polygon(view, HULL, points)
             pygame.draw.aalines(view, HULL, True, points)
@@ -168,7 +168,7 @@ class Window:
 
     # ---- the words
 
-    def _draw_words(self, view: "pygame.Surface", shown: Shown) -> None:
+    def _draw_words(self, view: "pygame.Surface", shown: Frame) -> None:
         self._write(view, self._title, (16, 14), FAINT)
         self._write(view, f"a square is {self._craft.length:g} m", (view.get_width() - 16, 14), FAINT, right=True)
         for i, note in enumerate(shown.notes):
@@ -186,7 +186,7 @@ class Window:
             self._write(panel, meaning, (150, 24 + 30 * i), TEXT)
         view.blit(panel, ((view.get_width() - 620) / 2, (view.get_height() - panel.get_height()) / 2))
 
-    def _draw_instruments(self, screen: "pygame.Surface", shown: Shown) -> None:
+    def _draw_instruments(self, screen: "pygame.Surface", shown: Frame) -> None:
         top = screen.get_height() - BAR
         heading = degrees(shown.pose[2]) % 360.0
         wind = hypot(shown.controls.wind_x, shown.controls.wind_y)
