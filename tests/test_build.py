@@ -44,7 +44,9 @@ def archives(kind: str, place: Path, out: Path) -> Path:
 def test_the_wheel_of_a_checkout_and_of_the_sdist_and_their_fmus(
     fmu: Path, complete_native_fmu: Path, fresh: Fresh, tmp_path: Path
 ) -> None:
-    """The same bytes, for any Python, at most 4 MB; nothing in the sdist that only looks like its files."""
+    """The same bytes, machine code compiled again and all, for any Python, at most 4 MB; nothing in the sdist that only
+    looks like its files.
+    """
     wheel, sdist = (archives(kind, ROOT, tmp_path / kind) for kind in ("wheel", "sdist"))
     assert wheel.name.endswith("-py3-none-any.whl")
     assert wheel.stat().st_size <= 4_000_000

@@ -11,7 +11,6 @@ from hovercraft_fmu.building import PRODUCTS, build
 from hovercraft_fmu.fmu import machine_code
 from hovercraft_fmu.fmu.description import NATIVE
 from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all, library
-from tests.conftest import FMI_2
 
 
 @pytest.fixture
@@ -76,20 +75,6 @@ def test_a_compiler_that_is_left_out_or_another(
     assert says in last
     assert "pip install" in last
     assert files_of(nothing_compiled) == {"why_not.txt"}
-
-
-@pytest.mark.once
-@pytest.mark.usefixtures("complete_native_fmu")
-@FMI_2
-def test_the_same_bytes_again(nothing_compiled: Path) -> None:
-    """From an empty cache, in another folder."""
-    compiled = Path(machine_code.__file__).parent / "compiled" / library(NATIVE).folder.name
-    assert compile_all() == ""
-    again = library(NATIVE).folder
-    assert nothing_compiled in again.parents
-    assert len(files_of(again)) == len(PLATFORMS)
-    assert files_of(again) == files_of(compiled)
-    assert all((again / name).read_bytes() == (compiled / name).read_bytes() for name in files_of(again))
 
 
 @pytest.mark.once

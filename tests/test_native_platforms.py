@@ -192,8 +192,8 @@ def printed_by(program: Path) -> str:
     return done.stdout.strip()
 
 
-SANITIZERS = {"address": ("-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
-              "thread": ("-g", "-fsanitize=thread")}  # fmt: skip
+SANITIZERS = {"address": ("-O1", "-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
+              "thread": ("-O1", "-g", "-fsanitize=thread")}  # fmt: skip
 
 
 def test_eight_threads_of_a_thousand_instances(unpacked: Unpacked) -> None:
