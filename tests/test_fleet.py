@@ -1,6 +1,7 @@
 """Many craft at once: each with the bits of the kernel that the native FMU has, whatever its neighbours do."""
 
 import math
+import subprocess
 import sys
 import threading
 from dataclasses import astuple, replace
@@ -173,6 +174,11 @@ def test_no_craft_one_craft_and_a_step_of_no_time() -> None:
         ({"controls": np.zeros((5, 4))}, "thrust: shape (4,): must be (3,), one for each craft"),
         ({"communication_step": np.zeros(2)}, "communication_step: shape (2,): must be (3,), one for each"),
         ({"crafts": [Craft()] * 2}, "mass: shape (2,): must be (3,), one for each"),
+        ({"communication_step": "x"}, "communication_step = 'x': must be a number, or an array of them, one for each"),
+        ({"proposed": [0.1, "a"]}, "proposed = [0.1, 'a']: must be a number, or an array of"),
+        ({"states": 0.0}, "states: 1 rows: must be 6, one for each quantity"),
+        ({"states": [*State()[:5], "fast"]}, "yaw_rate = 'fast': must be a number, or an array of them"),
+        ({"slopes": [0.0, [[1.0], [1.0, 2.0]], 0.0, 0.0, 0.0]}, "slope of port = [[1.0], [1.0, 2.0]]: must be a"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_named(change: dict[str, Any], says: str) -> None:
@@ -190,6 +196,7 @@ def test_what_does_not_fit_is_named(change: dict[str, Any], says: str) -> None:
         ({"thrust_min": [0.0, 20.0]}, "craft 1: thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"),
         ({"air_density": [1.0, 1e308]}, "craft 1: drag_factor = inf kg/m: must be a finite number"),
         ({"mass": math.nan}, "mass = nan: must be a finite number"),
+        ({"mass": "a"}, "mass = 'a': must be a number, or an array of them, one for each craft"),
         ({"weight": 1.0}, "weight: must be a parameter of a craft: mass, "),
         ({"mass": [1.0, 2.0], "inertia": [1.0, 2.0, 3.0]}, "mass: shape (2,): must be (3,)"),
     ],
@@ -265,3 +272,21 @@ def test_the_cloud_is_refused_before_the_fleet_runs(tmp_path: Path, monkeypatch:
 def test_constants_are_in_the_order_of_the_craft() -> None:
     names = list(Crafts().columns)
     assert [float(Crafts().columns[name]) for name in names] == list(map(float, astuple(Craft())))
+
+
+@pytest.mark.parametrize(
+    ("before", "says"),
+    [
+        (
+            "from hovercraft_fmu.fmu import machine_code as c; c.COMPILED /= 'none'",
+            "no machine code: it was never compiled",
+        ),
+        ("import sys; sys.modules['matplotlib'] = None", "pip install 'hovercraft-fmu[plot]'"),
+    ],
+)
+def test_what_the_cloud_lacks_is_said_in_one_line(before: str, says: str, tmp_path: Path) -> None:
+    code = f"{before}; import runpy; runpy.run_module('hovercraft_fmu.examples.cloud', run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert says in done.stderr
+    assert len(done.stderr.splitlines()) == 1

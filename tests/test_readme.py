@@ -39,6 +39,8 @@ def test_python_blocks_run(code: str, folder: Path) -> None:
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=folder, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout
+    assert "warning" not in done.stdout.lower()  # fmpy prints it of an input without a column
+    assert "[" not in done.stdout  # numbers, no arrays
 
 
 def test_the_first_command_runs_as_a_program(tmp_path: Path) -> None:

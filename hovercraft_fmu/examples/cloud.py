@@ -39,4 +39,7 @@ def main(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "cloud.png"))
+    try:
+        main(Path(sys.argv[1] if len(sys.argv) > 1 else "cloud.png"))
+    except (ValueError, OSError, ModuleNotFoundError) as error:  # another name, no compiled library, no matplotlib
+        sys.exit(str(error))

@@ -2,6 +2,7 @@
 
 import math
 import platform
+import reprlib
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from ctypes import CDLL, POINTER, Structure, byref, c_int32, c_int64, c_void_p
@@ -76,7 +77,8 @@ class Crafts:
         unknown = sorted(parameters.keys() - set(PARAMETERS))
         if unknown:
             raise ValueError(f"{unknown[0]}: must be a parameter of a craft: {', '.join(PARAMETERS)}")
-        columns = {field.name: np.asarray(parameters.get(field.name, field.default), float) for field in fields(Craft)}
+        columns = {field.name: _column(field.name, field.default) for field in fields(Craft)}
+        columns |= {name: _column(name, value) for name, value in parameters.items()}
         lengths = {name: column.size for name, column in columns.items() if column.ndim}
         count = max(lengths.values(), default=1)
         for name, column in columns.items():
@@ -145,15 +147,16 @@ def advance_fleet(
         proposed: s; what the last call with the adaptive method returned, 0 at the start.
 
     Raises:
-        ValueError: rows of another number or length, crafts that cannot be. (A craft whose numbers are not finite, or
-            whose motion runs away, is refused alone; see `Fleet`.)
+        ValueError: rows of another number or length, what is no number, crafts that cannot be. (A craft whose numbers
+            are not finite, or whose motion runs away, is refused alone; see `Fleet`.)
         NotCompiledError: the compiled library is missing; the message says how to get it.
     """
-    rows = _rows("states", states, len(State._fields))
+    rows = _rows("states", states, State._fields)
     chosen = Crafts.of(crafts)
     count = max([row.size for row in rows if row.ndim], default=chosen.count or 1)
-    given = _Given(count, rows, _rows("controls", controls, len(Controls._fields)), chosen, slopes)
-    way = [np.asarray(each, float) for each in (communication_step, settings.step_size, settings.tolerance, proposed)]
+    given = _Given(count, rows, _rows("controls", controls, Controls._fields), chosen, slopes)
+    numbers = (communication_step, settings.step_size, settings.tolerance, proposed)
+    way = [_column(name, each) for name, each in zip(_WAY, numbers, strict=True)]
     structure = _Way(integrator=INTEGRATORS.index(settings.integrator) + 1)
     way = _put(structure, "numbers", count, way, _WAY)
     found = _Found(count)
@@ -166,10 +169,10 @@ def observe_fleet(states: Rows, controls: Rows, crafts: Crafts | Craft | Sequenc
 
     For arguments and errors see `advance_fleet`.
     """
-    rows = _rows("states", states, len(State._fields))
+    rows = _rows("states", states, State._fields)
     chosen = Crafts.of(crafts)
     count = max([row.size for row in rows if row.ndim], default=chosen.count or 1)
-    given = _Given(count, rows, _rows("controls", controls, len(Controls._fields)), chosen, None)
+    given = _Given(count, rows, _rows("controls", controls, Controls._fields), chosen, None)
     seen = np.empty((6, count))
     pointers = [row.ctypes.data for row in seen]
     _library().fleet_observe(byref(given.structure), (c_void_p * 2)(*pointers[:2]), (c_void_p * 4)(*pointers[2:]))
@@ -269,11 +272,19 @@ class _CReached(Structure):
 TOO_MANY, RUNAWAY, TOO_SMALL = range(1, 4)
 
 
-def _rows(name: str, given: Rows, wanted: int) -> list[Array]:
-    rows = [np.asarray(row, float) for row in given]  # type: ignore[union-attr]
-    if len(rows) != wanted:
-        raise ValueError(f"{name}: {len(rows)} rows: must be {wanted}, one for each quantity")
-    return rows
+def _rows(name: str, given: Rows, quantities: Sequence[str]) -> list[Array]:
+    rows = list(given) if isinstance(given, Sequence) else list(np.atleast_1d(given))
+    if len(rows) != len(quantities):
+        raise ValueError(f"{name}: {len(rows)} rows: must be {len(quantities)}, one for each quantity")
+    return [_column(quantity, row) for quantity, row in zip(quantities, rows, strict=True)]
+
+
+def _column(name: str, given: Any) -> Array:
+    try:
+        return np.asarray(given, float)
+    except (ValueError, TypeError):
+        shown = " ".join(reprlib.repr(given).split())
+        raise ValueError(f"{name} = {shown}: must be a number, or an array of them, one for each craft") from None
 
 
 def _check_shape(name: str, column: Array, count: int) -> None:
@@ -300,9 +311,9 @@ class _Given:
     def __init__(
         self, count: int, states: list[Array], controls: list[Array], crafts: Crafts, slopes: Rows | None
     ) -> None:
-        rates = [np.zeros(())] * len(Controls._fields) if slopes is None else _rows("slopes", slopes, 5)
         self.structure = _CFleet(count=count)
         slope_names = tuple(f"slope of {name}" for name in Controls._fields)
+        rates = [np.zeros(())] * len(slope_names) if slopes is None else _rows("slopes", slopes, slope_names)
         self._rows: dict[str, Array] = {}
         for field, columns, names in (
             ("states", states, State._fields),
