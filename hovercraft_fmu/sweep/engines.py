@@ -100,17 +100,19 @@ class Driver:
         count = len(next(iter(samples.values())))
         ran = empty(self._plan, count)
         columns = {name: column.tolist() for name, column in samples.items()}
-        for i in range(count):
-            values = self._shared | {name: column[i] for name, column in columns.items()}
-            try:
-                with _interrupt_afterwards():
+        with _interrupted_afterwards() as interrupted:
+            for i in range(count):
+                values = self._shared | {name: column[i] for name, column in columns.items()}
+                try:
                     self._one(values)
-                ran.record[i] = self._record
-                (ran.warnings[i],) = self._warnings.get()
-            except (SimulationError, ValueError) as error:
-                ran.errors[i] = str(error)
-            self._craft.messages.clear()
-            self._craft.reset()
+                    ran.record[i] = self._record
+                    (ran.warnings[i],) = self._warnings.get()
+                except (SimulationError, ValueError) as error:
+                    ran.errors[i] = str(error)
+                self._craft.messages.clear()
+                self._craft.reset()
+                if interrupted:
+                    break
         return ran
 
     def _one(self, values: Mapping[str, float | int]) -> None:
@@ -132,15 +134,18 @@ class Driver:
 
 
 @contextmanager
-def _interrupt_afterwards() -> Iterator[None]:
-    """A Ctrl-C waits for the end of a run: inside a Python FMU it would be the FMU's error, or end the process."""
+def _interrupted_afterwards() -> Iterator[list[bool]]:
+    """A Ctrl-C waits for the end of a run: inside a Python FMU it would be the FMU's error, or end the process.
+
+    The list is empty until there was one; at the end it is raised.
+    """
+    seen: list[bool] = []
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield seen
         return
-    seen = []
     before = signal.signal(signal.SIGINT, lambda *_: seen.append(True))
     try:
-        yield
+        yield seen
     finally:
         signal.signal(signal.SIGINT, before)
         if seen:
