@@ -17,16 +17,25 @@ from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.model.subcycling import advance, substeps
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Run, plan, schedule
-from tests.native import C_TESTS, compile_c
+from tests.native import C_TESTS, c_compiler, compile_c
 
 SMOOTH = [scene for scene in SCENES.values() if not scene.craft.rubs]
 STEPS = {"semi_implicit_euler": 0.001, "rk4": 0.1}
 WIDTHS = {"double": (), "quadruple": ("-DQUAD", "-lquadmath")}
 
 
+def _require_quadmath(folder: Path) -> None:
+    probe = folder / "probe.c"
+    probe.write_text("#include <quadmath.h>\nint main(void) { return 0; }\n")
+    command = [c_compiler(), str(probe), "-lquadmath", "-o", str(folder / "probe")]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        pytest.skip("no libquadmath (it comes with gcc; clang has none)")
+
+
 @pytest.fixture(scope="module")
 def unfolded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("unfolded")
+    _require_quadmath(folder)
     return {
         name: compile_c(folder / name, [C_TESTS / "unfolded.c"], *options, "-lm") for name, options in WIDTHS.items()
     }
