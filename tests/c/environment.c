@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "calls.h"
+#include "checksum.h"
 #include "variables.h"
 
 #if defined(__SSE2__)
@@ -51,7 +52,7 @@ enum { STEPS = 12, TERMS = 5, METHOD_COUNT = sizeof METHODS / sizeof *METHODS };
 
 static unsigned host;
 static unsigned calls;
-static unsigned long long hash;
+static uint64_t hash;
 
 static void demand(int good, const char *what)
 {
@@ -64,8 +65,7 @@ static void demand(int good, const char *what)
 
 static void add(const void *bytes, size_t n)
 {
-    for (size_t i = 0; i < n; i++)
-        hash = (hash ^ ((const unsigned char *)bytes)[i]) * 0x100000001b3ULL;
+    hash = checksum(hash, bytes, n);
 }
 
 static int left(int status, const char *call)
@@ -190,7 +190,7 @@ static void run_away(int method, enum call_use use)
 {
     static const unsigned references[] = {V_VELOCITY_X, V_VELOCITY_YAW_RATE};
     static const double values[] = {1e200, 1e200};
-    void *craft = call_instantiate(use, GUID, "");
+    void *craft = call_instantiate(use, VARIANT.guid, "");
     demand(craft != NULL, "instantiate");
     IN_HOST(call_choose(craft, V_INTEGRATOR, method));
     IN_HOST(call_set(craft, references, 2, values));
@@ -205,7 +205,7 @@ static void run_away(int method, enum call_use use)
 
 static void run(int method, enum call_use use, int term)
 {
-    void *craft = call_instantiate(use, GUID, "");
+    void *craft = call_instantiate(use, VARIANT.guid, "");
     demand(craft != NULL, "instantiate");
     IN_HOST(call_choose(craft, V_INTEGRATOR, method));
     set_terms(craft, term);
@@ -224,12 +224,12 @@ static void run(int method, enum call_use use, int term)
 
 int main(void)
 {
-    unsigned long long expected = 0;
+    uint64_t expected = 0;
     const unsigned n = sizeof HOSTS / sizeof *HOSTS;
     call_tell = told;
     for (unsigned i = 0; i < n; i++) {
         host = HOSTS[i];
-        hash = 0xcbf29ce484222325ULL;
+        hash = CHECKSUM_OF_NOTHING;
         calls = 0;
         for (int use = CALL_STEPS; use <= CALL_EXCHANGE; use++)
             for (int method = 1; method <= METHOD_COUNT; method++) {

@@ -1,5 +1,6 @@
 /* A hash of every bit of 2000 wild starts with each method and each term, on any platform; "method term hash". */
 
+#include "checksum.h"
 #include "fleet.c"
 
 #ifdef _WIN32
@@ -68,13 +69,6 @@ static void draw(int term)
     }
 }
 
-static uint64_t mixed(uint64_t hash, const void *bytes, size_t n)
-{
-    for (size_t i = 0; i < n; i++)
-        hash = (hash ^ ((const unsigned char *)bytes)[i]) * 1099511628211u;
-    return hash;
-}
-
 static uint64_t hash_of(int method, const double *slopes)
 {
     static const double step = 0.3, size = 0.01, tolerance = 1e-6, nothing = 0.0;
@@ -93,10 +87,10 @@ static uint64_t hash_of(int method, const double *slopes)
     for (int k = 0; k < FLEET_CONSTANTS; k++)
         fleet.constants[k] = (struct column){constants[k], 1};
     const int64_t refused = fleet_advance(&fleet, &way, &reached);
-    uint64_t hash = mixed(14695981039346656037u, &refused, sizeof refused);
-    hash = mixed(hash, ends, sizeof ends);
-    hash = mixed(hash, reals[0], 3 * sizeof reals[0]);
-    return mixed(mixed(hash, counts, sizeof counts), whys, sizeof whys);
+    uint64_t hash = checksum(CHECKSUM_OF_NOTHING, &refused, sizeof refused);
+    hash = checksum(hash, ends, sizeof ends);
+    hash = checksum(hash, reals[0], 3 * sizeof reals[0]);
+    return checksum(checksum(hash, counts, sizeof counts), whys, sizeof whys);
 }
 
 static void all(void)

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "calls.h"
+#include "checksum.h"
 #include "variables.h"
 
 enum { INSTANCES = 2, SLOTS = 4, MOST = 5, BLOB = 1024, CALLS = 28 };
@@ -119,15 +120,6 @@ static void some_references(struct bytes *bytes, unsigned unknowns[MOST], unsign
 #include "fuzz_fmi2.h"
 #endif
 
-static uint64_t checksum(const void *bytes, size_t n)
-{
-    const unsigned char *each = bytes;
-    uint64_t sum = UINT64_C(0xcbf29ce484222325);
-    for (size_t i = 0; i < n; i++)
-        sum = (sum ^ each[i]) * UINT64_C(0x100000001b3);
-    return sum;
-}
-
 enum { SUMMED = sizeof VARIANT - sizeof VARIANT.checksum }; /* fuzz.py makes it one that can be written */
 
 /* Now and then the library has other start values, or other bytes among them; half of these with the right checksum. */
@@ -143,7 +135,7 @@ static void spoil_variant(struct bytes *bytes)
         ((char *)&VARIANT)[at] = (char)a_byte(bytes);
     }
     if (how & 8)
-        VARIANT.checksum = checksum(&VARIANT, SUMMED);
+        VARIANT.checksum = checksum(CHECKSUM_OF_NOTHING, &VARIANT, SUMMED);
 }
 
 /* Half of them are past their start already; in continuous-time mode, where they are for that. Of the others half are
@@ -152,7 +144,8 @@ static void *started(struct bytes *bytes, const struct variant *ours)
 {
     void *craft = made(bytes);
     const unsigned how = craft ? a_byte(bytes) : 0;
-    demand(!craft || VARIANT.checksum == checksum(&VARIANT, SUMMED), "damaged start values were taken");
+    demand(!craft || VARIANT.checksum == checksum(CHECKSUM_OF_NOTHING, &VARIANT, SUMMED),
+           "damaged start values were taken");
     if (how & 3)
         demand(enter(craft) == CALL_OK, "to initialization mode");
     if (how & 1) {
@@ -245,7 +238,7 @@ static void spoil(struct world *world, struct bytes *bytes)
         world->blob[at] = (char)a_byte(bytes);
     }
     if (how >= 200) {
-        const uint64_t sum = checksum(world->blob, world->blob_size - 8);
+        const uint64_t sum = checksum(CHECKSUM_OF_NOTHING, world->blob, world->blob_size - 8);
         memcpy(world->blob + world->blob_size - 8, &sum, 8);
         world->forged = 1;
     }

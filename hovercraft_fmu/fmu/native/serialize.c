@@ -4,10 +4,11 @@
      bytes 8-11    version of this layout
      bytes 12-43   the build, hexadecimal
      then          the content, in the order of `exchange`: doubles 8 bytes, integers 4
-     last 8        FNV-1a of all before: no change of a single byte escapes it */
+     last 8        checksum of all before */
 
 #include <string.h>
 
+#include "checksum.h"
 #include "instance.h"
 #include "variant.h"
 
@@ -126,14 +127,6 @@ static size_t serialized_size(void)
     return cursor.at + SUM_SIZE;
 }
 
-static uint64_t checksum(const unsigned char *bytes, size_t n)
-{
-    uint64_t sum = UINT64_C(0xcbf29ce484222325);
-    for (size_t i = 0; i < n; i++)
-        sum = (sum ^ bytes[i]) * UINT64_C(0x100000001b3);
-    return sum;
-}
-
 enum verdict instance_serialize(struct instance *instance, const struct content *content, unsigned char *bytes,
                                 size_t size)
 {
@@ -149,7 +142,7 @@ enum verdict instance_serialize(struct instance *instance, const struct content 
     memcpy(bytes + cursor.at, variant()->build, BUILD_SIZE);
     cursor.at = HEAD_SIZE;
     exchange(&cursor, &copy);
-    uint64_t sum = checksum(bytes, cursor.at);
+    uint64_t sum = checksum(CHECKSUM_OF_NOTHING, bytes, cursor.at);
     exchange_word(&cursor, &sum, SUM_SIZE);
     return FINE;
 }
@@ -161,7 +154,7 @@ static bool is_complete(const unsigned char *bytes, size_t size)
     if (size < HEAD_SIZE + SUM_SIZE || memcmp(bytes, MAGIC, MAGIC_SIZE) != 0)
         return false;
     exchange_word(&cursor, &sum, SUM_SIZE);
-    return sum == checksum(bytes, size - SUM_SIZE);
+    return sum == checksum(CHECKSUM_OF_NOTHING, bytes, size - SUM_SIZE);
 }
 
 static bool is_of_this_build(const unsigned char *bytes, size_t size)

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "checksum.h"
+
 _Static_assert(sizeof VARIANT == 16 + 8 + 3 * 40 + 8 * VARIABLE_COUNT + 8, "no gaps: it is written as bytes");
 
 const struct variant *variant(void)
@@ -12,26 +14,20 @@ const struct variant *variant(void)
 
 static uint64_t with_word(uint64_t sum, uint64_t word)
 {
+    unsigned char bytes[8];
     for (unsigned i = 0; i < 8; i++)
-        sum = (sum ^ (word >> 8 * i & 0xff)) * UINT64_C(0x100000001b3);
-    return sum;
+        bytes[i] = (unsigned char)(word >> 8 * i);
+    return checksum(sum, bytes, sizeof bytes);
 }
 
-static uint64_t with_text(uint64_t sum, const char *text, size_t size)
-{
-    for (size_t i = 0; i < size; i++)
-        sum = (sum ^ (unsigned char)text[i]) * UINT64_C(0x100000001b3);
-    return sum;
-}
-
-/* FNV-1a of all before the checksum: no change of a single byte escapes it. */
+/* Of all before the checksum. */
 static uint64_t checksum_of(const struct variant *v)
 {
-    uint64_t sum = with_text(UINT64_C(0xcbf29ce484222325), v->mark, sizeof v->mark);
+    uint64_t sum = checksum(CHECKSUM_OF_NOTHING, v->mark, sizeof v->mark);
     sum = with_word(sum, v->size);
-    sum = with_text(sum, v->code, sizeof v->code);
-    sum = with_text(sum, v->build, sizeof v->build);
-    sum = with_text(sum, v->guid, sizeof v->guid);
+    sum = checksum(sum, v->code, sizeof v->code);
+    sum = checksum(sum, v->build, sizeof v->build);
+    sum = checksum(sum, v->guid, sizeof v->guid);
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
         uint64_t word;
         memcpy(&word, &v->starts[i], sizeof word);
