@@ -50,6 +50,16 @@ EXPECTED = (ValueError, OSError, ArithmeticError, ModuleNotFoundError)
 """What a wrong name, file or value ends in, beside what an FMU refuses: one line, no traceback."""
 
 
+class PathOf(click.Path):
+    """A path that is not empty: pathlib takes '' for the current folder."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Raises click.BadParameter."""
+        if value == "":
+            self.fail("'': must be a path", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command and leave the process: status 0, or 1 after one line that says what is wrong."""
     try:
@@ -91,7 +101,7 @@ def commands(context: click.Context) -> None:
 @commands.command("build")
 @click.argument("kinds", nargs=-1, metavar="[KIND ...]")
 @click.option(
-    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", default=FOLDER, show_default=True
+    "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR", default=FOLDER, show_default=True
 )
 @click.option("--name", metavar="NAME", help="Write one FMU under this name, with start values of its own.")
 @click.option("--preset", metavar="NAME", help=f"With --name: those of a craft: {', '.join(PRESETS)}.")
@@ -105,15 +115,19 @@ def build_command(
     and with --name the native FMU alone.
     """
     from .building import PRODUCTS, product, variant_product
+    from .fmu.archive import check_target
 
+    kinds = tuple(dict.fromkeys(kinds))
     if name is not None:
         if len(kinds) > 1:
             raise click.UsageError("--name: must be given with one KIND: it is the name of one file")
         wanted = [variant_product(kinds[0] if kinds else "native", name, preset, _settings(settings))]
-    elif preset or settings:
+    elif preset is not None or settings:
         raise click.UsageError("--preset and --set: must be given with --name, the name of an FMU with those values")
     else:
         wanted = [product(kind) for kind in kinds] or list(PRODUCTS.values())
+    for each in wanted:
+        check_target(output / each.name, Path(each.name).suffix)
     reasons = {each.name: _written(each, output / each.name) for each in wanted}
     if missing := [name for name, reason in reasons.items() if reason]:
         raise click.ClickException(f"not written: {', '.join(missing)}; {reasons[missing[0]]}")
@@ -135,14 +149,14 @@ def of_an_fmu(command: Callable[..., None]) -> Callable[..., None]:
     """The argument FMU and the option --fmu of a command that runs one."""
     kinds = click.Choice(["native", "native3", "python"])
     option = click.option("--fmu", "kind", type=kinds, help="Instead of a file: the FMU of that kind in build/.")
-    return click.argument("fmu", required=False, type=click.Path(path_type=Path))(option(command))
+    return click.argument("fmu", required=False, type=PathOf(path_type=Path))(option(command))
 
 
 @commands.command("simulate")
 @of_an_fmu
 @click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
 @click.option(
-    "--input", "log", metavar="FILE.csv", type=click.Path(path_type=Path),
+    "--input", "log", metavar="FILE.csv", type=PathOf(path_type=Path),
     help="A control log: columns time, thrust, port_thruster, starboard_thruster, wind.x, wind.y (one left out holds "
     "its start value); linear between rows, two rows at one time are a jump.",
 )  # fmt: skip
@@ -151,10 +165,10 @@ def of_an_fmu(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--stop-time", type=float, metavar="S", help="Default: the last time of the inputs.")
 @click.option("--communication-step", type=float, metavar="S", help="Default: the scene's, or 0.01 s.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
-@click.option("--output", type=click.Path(path_type=Path), metavar="FILE.csv", help="Write all columns.")
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the run.")
+@click.option("--output", type=PathOf(path_type=Path), metavar="FILE.csv", help="Write all columns.")
+@click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png", help="Draw the run.")
 @click.option(
-    "--animate", "animation", type=click.Path(path_type=Path), metavar="FILE.gif|FILE.html",
+    "--animate", "animation", type=PathOf(path_type=Path), metavar="FILE.gif|FILE.html",
     help="Draw the run as a moving picture, or as a page to play, zoom and point at.",
 )  # fmt: skip
 @click.option(
@@ -212,7 +226,7 @@ def simulate_command(
 
 @commands.command("drive")
 @of_an_fmu
-@click.option("--record", metavar="FILE.csv", type=click.Path(path_type=Path), help="Write what you do, to replay it.")
+@click.option("--record", metavar="FILE.csv", type=PathOf(path_type=Path), help="Write what you do, to replay it.")
 @click.option("--preset", metavar="NAME", default=PRESET, show_default=True, help=f"A craft: {', '.join(PRESETS)}.")
 @click.option("--integrator", metavar="NAME", help="The method of a sub-step; as --set integrator=NAME.")
 @click.option("--step-size", metavar="S", help="The sub-step; as --set step_size=S.")
@@ -240,7 +254,7 @@ def drive_command(
     from .view.drive import drive, plan_drive
 
     short = {"integrator": integrator, "step_size": step_size}
-    start_values = {**_settings(settings), **{k: v for k, v in short.items() if v is not None}}
+    start_values = _settings((*settings, *(f"{name}={value}" for name, value in short.items() if value is not None)))
     run = plan_drive(preset, start_values, communication_step)
     path = _named(fmu, kind)
 
@@ -255,7 +269,7 @@ def drive_command(
 
 
 @commands.command("validate")
-@click.argument("fmus", nargs=-1, metavar="[FMU ...]", type=click.Path(path_type=Path))
+@click.argument("fmus", nargs=-1, metavar="[FMU ...]", type=PathOf(path_type=Path))
 @click.option("--table", is_flag=True, help="Ask other checkers and hosts, too, and print a table (Markdown).")
 def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
     """Check FMUs: the schema, fmpy's validation, and a real run. Without FMU: build/HovercraftNative.fmu."""
@@ -342,7 +356,7 @@ MEASURE += "\n".join(f"  {name:12} {each.what} ({each.takes})" for name, each in
 @click.argument("name", metavar="NAME", type=click.Choice(list(MEASUREMENTS)))
 @click.option("--quick", is_flag=True, help="Fewer cases: below half a minute.")
 @click.option(
-    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Default: build/measure/NAME."
+    "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR", help="Default: build/measure/NAME."
 )
 def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 - MEASURE
     folder = output or FOLDER / "measure" / name
@@ -359,10 +373,10 @@ def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 
 @click.option("--workers", type=int, metavar="N", help="Processes on this machine. Default: one a processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
 @click.option(
-    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR",
     help="Default: build/sweep/ and the study.",
 )  # fmt: skip
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw the results.")
+@click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png", help="Draw the results.")
 def sweep_command(
     study: str,
     fmu: Path | None,
@@ -403,7 +417,7 @@ def sweep_command(
 
 
 @commands.command("cross-check")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path, file_okay=False))
+@click.argument("folder", metavar="DIR", type=PathOf(path_type=Path, file_okay=False))
 def cross_check_command(folder: Path) -> None:
     """Write what the FMI cross-check asks for: the native FMU, inputs, options, a reference result."""
     from .cross_check import write_cross_check
@@ -422,12 +436,15 @@ def _one_line(error: Exception) -> str:
 
 
 def _settings(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
-    settings = {}
+    settings: dict[str, str] = {}
     for text in texts:
         name, equals, value = text.partition("=")
-        if not equals:
+        name = name.strip()
+        if not (equals and name):
             raise click.UsageError(f"{option} {text}: must be NAME=VALUE")
-        settings[name.strip()] = value.strip()
+        if name in settings:
+            raise click.UsageError(f"{option} {text}: must be given once, and is {name}={settings[name]} already")
+        settings[name] = value.strip()
     return settings
 
 

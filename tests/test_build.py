@@ -1,5 +1,6 @@
 """Two builds of one tree give the same bytes; a build that fails leaves what was there."""
 
+import errno
 import hashlib
 import os
 import shutil
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from hovercraft_fmu.fmu.archive import write_archive
 from hovercraft_fmu.fmu.machine_code import LEAVE_OUT
 from hovercraft_fmu.fmu.python_package import build_fmu
 from tests.conftest import FMI_2, ROOT, Fresh
@@ -89,7 +91,7 @@ except OSError as error:
 """
     python, missing = fresh(code, env={"PYTHONPATH": str(installed)}).splitlines()
     assert python == str(Path("build/Hovercraft.fmu"))
-    assert missing.startswith(f"no machine code: {LEAVE_OUT} is set; install a wheel that has it: pip install ")
+    assert missing.startswith(f"no machine code: {LEAVE_OUT} was set when the package was installed; install it ")
 
 
 def test_a_build_leaves_the_process_as_it_was(tmp_path: Path) -> None:
@@ -116,9 +118,28 @@ def test_bad_paths(tmp_path: Path) -> None:
         build_fmu(tmp_path / "x.zip")
     folder = tmp_path / "folder.fmu"
     folder.mkdir()
-    with pytest.raises(OSError, match="folder"):
+    with pytest.raises(IsADirectoryError, match="must be a file, and is a folder"):
         build_fmu(folder)
     assert list(tmp_path.iterdir()) == [folder]
+
+
+@pytest.mark.parametrize("code", [errno.EROFS, errno.ENOSPC])
+def test_where_nothing_can_be_written_the_target_is_named(
+    code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file system says no: a place for reading alone, or a full one."""
+
+    def refuse(path: Path, _: bytes) -> int:
+        raise OSError(code, os.strerror(code), str(path))
+
+    target = tmp_path / "X.fmu"
+    target.write_text("before")
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    with pytest.raises(OSError, match=r"must be in a folder that can be written to, with room for it") as error:
+        write_archive(target, lambda: b"after")
+    assert error.value.filename == str(target)
+    assert str(error.value.strerror).endswith(f" ({os.strerror(code)})")
+    assert target.read_text() == "before"
 
 
 def test_one_licence() -> None:

@@ -149,6 +149,10 @@ def test_list_scenes(shell: Shell) -> None:
     [
         (("simulate", "--scene", "nix"), "scene = 'nix': must be one of launch"),
         (("simulate", "--set", "mass"), "--set mass: must be NAME=VALUE"),
+        (("simulate", "--set", "mass=1", "--set", "mass=2"), "--set mass=2: must be given once, and is mass=1 already"),
+        (("drive", "--integrator", "rk4", "--set", "integrator=heun"), "--set integrator=rk4: must be given once"),
+        (("simulate", "--output", ""), "'': must be a path"),
+        (("simulate", "--set", "mass=1e400"), "mass = 1e400: must be a finite number"),
         (("simulate", "--set", "mass=-4"), "mass = -4.0: must be greater than 0"),
         (("simulate", "--set", "nix=4"), "nix = 4: must be a variable that can be set"),
         (("simulate", "--input", "nix.csv"), "nix.csv: No such file or directory"),

@@ -31,10 +31,8 @@ def files_of(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.mark.usefixtures("one_platform")
-def test_changed_c_is_never_run_as_old_machine_code(
-    nothing_compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("one_platform", "nothing_compiled")
+def test_changed_c_is_never_run_as_old_machine_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     changed = tmp_path / "native"
     shutil.copytree(machine_code.C_FOLDER, changed)
     monkeypatch.setattr(machine_code, "C_FOLDER", changed)
@@ -47,18 +45,25 @@ def test_changed_c_is_never_run_as_old_machine_code(
     with pytest.raises(NotCompiledError, match=r"the C was changed since.*pip install -e"):
         library(NATIVE).path("x86_64-linux")
     assert compile_all() == ""
-    assert library(NATIVE).path("x86_64-linux").exists()
+    last = library(NATIVE).path("x86_64-linux")
+    assert last.exists()
     assert not old.exists()
     (changed / "kernel.c").write_text("#error on purpose\n")
     assert "on purpose" in compile_all()
     with pytest.raises(NotCompiledError, match=r"compiling .* for x86_64-linux-gnu\.2\.17 failed: .*on purpose"):
         library(NATIVE).path("x86_64-linux")
-    assert files_of(nothing_compiled) == {"why_not.txt"}
+    assert last.exists()  # the last good state: taking the change back is enough
 
 
 @pytest.mark.parametrize(
     ("variable", "version", "says"),
-    [("1", machine_code.COMPILER[1], "HOVERCRAFT_FMU_NO_COMPILER is set"), ("", "0.0.1", "must be 0.0.1")],
+    [
+        (
+            *("1", machine_code.COMPILER[1]),
+            "HOVERCRAFT_FMU_NO_COMPILER was set when the package was installed; install it again without that variable",
+        ),
+        ("", "0.0.1", "must be 0.0.1, which makes the bytes; compile it: pip install -e ."),
+    ],
 )
 def test_a_compiler_that_is_left_out_or_another(
     variable: str, version: str, says: str, nothing_compiled: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
@@ -66,7 +71,10 @@ def test_a_compiler_that_is_left_out_or_another(
     """The Python FMU is written all the same, and what is missing is said in one line."""
     monkeypatch.setenv(machine_code.LEAVE_OUT, variable)
     monkeypatch.setattr(machine_code, "COMPILER", ("ziglang", version))
-    assert says in compile_all()
+    stale = nothing_compiled / "HovercraftNative-0" / "x86_64-linux" / "HovercraftNative.so"
+    stale.parent.mkdir(parents=True)
+    stale.write_bytes(b"of other C")
+    assert says.partition(";")[0] in compile_all()
     done = CliRunner().invoke(cli.commands, ["build", "native", "python", "--output", str(tmp_path / "out")])
     assert done.exit_code == 1
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["Hovercraft.fmu"]
@@ -74,7 +82,8 @@ def test_a_compiler_that_is_left_out_or_another(
     assert last.startswith("Error: not written: HovercraftNative.fmu; no machine code: ")
     assert says in last
     assert "pip install" in last
-    assert files_of(nothing_compiled) == {"why_not.txt"}
+    assert last.endswith("; the Python FMU needs none: --fmu python, or build python")
+    assert files_of(nothing_compiled) == {"why_not.txt", stale.relative_to(nothing_compiled).as_posix()}
 
 
 @pytest.mark.once
@@ -101,3 +110,30 @@ def test_what_cannot_be_built(tmp_path: Path) -> None:
     refused = CliRunner().invoke(cli.commands, ["build", "python", "--output", str(file)])
     assert refused.exit_code != 0
     assert "is a file" in refused.output
+
+
+def test_all_targets_are_checked_before_one_is_written(tmp_path: Path) -> None:
+    folder = tmp_path / "Autopilot.fmu"
+    folder.mkdir()
+    done = CliRunner().invoke(cli.commands, ["build", "python", "autopilot", "--output", str(tmp_path)])
+    assert isinstance(done.exception, OSError)
+    assert (done.exception.filename, done.exception.strerror) == (str(folder), "must be a file, and is a folder")
+    assert list(tmp_path.iterdir()) == [folder]
+    (tmp_path / "file").write_text("")
+    done = CliRunner().invoke(cli.commands, ["build", "python", "--output", str(tmp_path / "file" / "sub")])
+    assert isinstance(done.exception, OSError)
+    assert done.exception.filename == str(tmp_path / "file" / "sub" / "Hovercraft.fmu")
+    assert done.exception.strerror == f"must be in a folder, and {tmp_path / 'file'} is a file"
+
+
+def test_a_kind_that_is_named_twice_is_written_once(tmp_path: Path) -> None:
+    done = CliRunner().invoke(cli.commands, ["build", "python", "python", "--output", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert len(done.output.splitlines()) == 1
+
+
+def test_each_purpose_stands_by_itself() -> None:
+    for each in PRODUCTS.values():
+        assert "same" not in each.purpose
+        if each.name.endswith(".ssp"):
+            assert f" of {each.name.removesuffix('Loop.ssp')}.fmu and Autopilot.fmu" in each.purpose

@@ -248,7 +248,17 @@ def test_a_loop_with_it_sails_with_its_start_values(native_fmu: Path, autopilot:
     assert found != loop_in("libcosimpy, functions", native_fmu, autopilot, folders[2])
     with zipfile.ZipFile(build("python_loop", tmp_path / "X.ssp", name="X", start_values=OWN)) as archive:
         assert {"resources/X.fmu", "resources/Autopilot.fmu"} <= set(archive.namelist())
-        assert b'source="resources/X.fmu"' in archive.read("SystemStructure.ssd")
+        structure = archive.read("SystemStructure.ssd")
+    assert b'source="resources/X.fmu"' in structure
+    assert b' name="XLoop"' in structure
+
+
+def test_the_purpose_of_a_loop_names_the_fmu_in_it(tmp_path: Path) -> None:
+    done = CliRunner().invoke(commands, ["build", "python_loop", "--name", "IceL", "--preset", "ice", "--output",
+                                         str(tmp_path)])  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "IceLLoop.ssp: " in done.output
+    assert "the closed loop of IceL.fmu and Autopilot.fmu, " in done.output
 
 
 # ---- the block in a library
@@ -436,6 +446,14 @@ BAD: dict[str, tuple[list[str], str]] = {
     "empty": (["--name", ""], "name = '': must be a C identifier"),
     "a keyword": (["python", "--name", "class"], "name = 'class': must be a C identifier"),
     "an ordinary name": (["--name", "HovercraftNative"], "name = 'HovercraftNative': must be another one"),
+    "the autopilot's name": (["--name", "Autopilot"], "name = 'Autopilot': must be another one: Autopilot.fmu has"),
+    "its name, small": (["native_loop", "--name", "autopilot"], "name = 'autopilot': must be another one"),
+    "a loop's name": (["--name", "HovercraftLoop"], "name = 'HovercraftLoop': must be another one: HovercraftLoop.ssp"),
+    "twice": (["--name", "X", "--set", "mass=1", "--set", "mass=2"], "--set mass=2: must be given once, and is mass=1"),
+    "no variable's name": (["--name", "X", "--set", "=3"], "--set =3: must be NAME=VALUE"),
+    "too large": (["--name", "X", "--set", "mass=1e400"], "mass = 1e400: must be a finite number"),
+    "an empty output": (["python", "--output", ""], "Invalid value for '--output': '': must be a path"),
+    "an empty preset": (["--name", "X", "--preset", ""], "preset = '': must be one of textbook, ice"),
     "no name": (["--preset", "ice"], "--preset and --set: must be given with --name"),
     "preset": (["--name", "X", "--preset", "snow"], "preset = 'snow': must be one of textbook, ice"),
     "no variable": (["--name", "X", "--set", "masss=1"], "masss = 1: must be a variable that can be set: thrust"),
@@ -456,7 +474,7 @@ BAD: dict[str, tuple[list[str], str]] = {
 @pytest.mark.parametrize("case", BAD)
 def test_what_cannot_be_is_one_line_and_nothing_is_written(case: str, tmp_path: Path) -> None:
     arguments, message = BAD[case]
-    done = CliRunner().invoke(commands, ["build", *arguments, "--output", str(tmp_path / "out")])
+    done = CliRunner().invoke(commands, ["build", "--output", str(tmp_path / "out"), *arguments])
     assert done.exit_code != 0
     said = done.output.splitlines()[-1].removeprefix("Error: ") if done.output else str(done.exception)
     assert said.startswith(message)

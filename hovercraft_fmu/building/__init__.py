@@ -14,6 +14,7 @@ from xml.etree.ElementTree import ParseError, fromstring
 from .._version import __version__
 from ..autopilot.pilot_package import CONTENT as AUTOPILOT_CONTENT
 from ..autopilot.pilot_package import build_autopilot
+from ..fmu.archive import check_target
 from ..fmu.block import guid
 from ..fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from ..fmu.machine_code import identity
@@ -47,13 +48,16 @@ def _craft(flavour: Flavour) -> Callable[[Path], Path]:
     return lambda path: (build_native_fmu if flavour.parts else build_fmu)(path, flavour)
 
 
-def _loop(flavour: Flavour) -> Callable[[Path], Path]:
-    def write(path: Path) -> Path:
-        with TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
-            craft = _craft(flavour)(Path(folder) / f"{flavour.identifier}.fmu")
-            return build_ssp(path, craft, build("autopilot", Path(folder) / PRODUCTS["autopilot"].name))
+def _loop(flavour: Flavour) -> Product:
+    fmu, pilot = f"{flavour.identifier}.fmu", f"{AUTOPILOT_CONTENT.flavour.identifier}.fmu"
 
-    return write
+    def write(path: Path) -> Path:
+        check_target(path, ".ssp")
+        with TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
+            return build_ssp(path, _craft(flavour)(Path(folder) / fmu), build_autopilot(Path(folder) / pilot))
+
+    purpose = f"SSP 1.0: the closed loop of {fmu} and {pilot}, for co-simulation masters"
+    return Product(f"{flavour.identifier}Loop.ssp", purpose, write)
 
 
 PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
@@ -82,21 +86,9 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
             build_autopilot,
             lambda: python_identity(AUTOPILOT_CONTENT),
         ),
-        "native_loop": Product(
-            "HovercraftNativeLoop.ssp",
-            "SSP 1.0: the closed loop of HovercraftNative.fmu and Autopilot.fmu, for co-simulation masters",
-            _loop(NATIVE),
-        ),
-        "native3_loop": Product(
-            "HovercraftNative3Loop.ssp",
-            "SSP 1.0: the same loop with HovercraftNative3.fmu",
-            _loop(NATIVE3),
-        ),
-        "python_loop": Product(
-            "HovercraftLoop.ssp",
-            "SSP 1.0: the same loop with Hovercraft.fmu",
-            _loop(PYTHON),
-        ),
+        "native_loop": _loop(NATIVE),
+        "native3_loop": _loop(NATIVE3),
+        "python_loop": _loop(PYTHON),
     }
 )
 assert tuple(PRODUCTS) == get_args(Kind)
@@ -126,9 +118,9 @@ def build(
         OSError: the file cannot be written; one that stood there before still does.
     """
     chosen = product(kind) if name is None else variant_product(kind, name, preset, start_values)
-    if name is None and (preset or start_values):
+    if name is None and (preset is not None or start_values):
         raise ValueError("name: must be given, as an FMU with start values of its own is not to be taken for another")
-    return chosen.write(Path(path or FOLDER / chosen.name))
+    return chosen.write(FOLDER / chosen.name if path is None else Path(path))
 
 
 def variant_product(kind: str, name: str, preset: str | None, start_values: Mapping[str, Value] | None) -> Product:
@@ -137,11 +129,12 @@ def variant_product(kind: str, name: str, preset: str | None, start_values: Mapp
     if ordinary is None:
         can = ", ".join((*FLAVOURS, *LOOPS))
         raise ValueError(f"kind = {kind!r}: must be one of {can} to have start values of its own")
+    # without regard to case, as some file systems are
+    if taken := [each.name for each in PRODUCTS.values() if Path(each.name).stem.lower() == name.lower()]:
+        raise ValueError(f"name = {name!r}: must be another one: {taken[0]} has no start values of its own")
     flavour = variant(ordinary, name, start_values, preset)
-    purpose = "; ".join(filter(None, (row.purpose, flavour.model.listed(flavour.own_starts))))
-    if kind in LOOPS:
-        return Product(f"{name}Loop.ssp", purpose, _loop(flavour))
-    return Product(f"{name}.fmu", purpose, _craft(flavour))
+    own = _loop(flavour) if kind in LOOPS else row._replace(name=f"{name}.fmu", write=_craft(flavour), identity=None)
+    return own._replace(purpose="; ".join(filter(None, (own.purpose, flavour.model.listed(flavour.own_starts)))))
 
 
 def product(kind: str) -> Product:

@@ -49,7 +49,7 @@ def system_structure(voyage: Voyage, craft: str, autopilot: str) -> Element:
     root = Element(
         f"{{{SSD}}}SystemStructureDescription",
         {
-            "name": "HovercraftLoop",
+            "name": f"{Path(craft).stem}Loop",
             "version": "1.0",
             "description": f"A hovercraft and its autopilot; {voyage.description}",
             "author": AUTHOR,

@@ -1,5 +1,6 @@
 """Archives: written at once or not at all, the same bytes whenever and wherever they are made."""
 
+import errno
 import hashlib
 import io
 import os
@@ -16,17 +17,35 @@ def write_archive(path: str | os.PathLike[str], make: Callable[[], bytes], suffi
         OSError: the file cannot be written; one that stood there before still does.
     """
     path = Path(path)
+    check_target(path, suffix)
+    content = make()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _replace(path, content)
+    except OSError as error:  # it names a file that nobody asked for
+        rule = "must be in a folder that can be written to, with room for it"
+        raise OSError(error.errno, f"{rule} ({error.strerror})", str(path)) from error
+    return path
+
+
+def check_target(path: Path, suffix: str) -> None:
+    """Raises as `write_archive` does where it can be told beforehand that a file cannot be written."""
     if path.suffix != suffix:
         raise ValueError(f"path = {str(path)!r}: must end in {suffix}")
-    content = make()
-    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        raise OSError(errno.EISDIR, "must be a file, and is a folder", str(path))
+    above = next(folder for folder in path.parents if folder.exists())
+    if not above.is_dir():
+        raise OSError(errno.ENOTDIR, f"must be in a folder, and {above} is a file", str(path))
+
+
+def _replace(path: Path, content: bytes) -> None:
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         unfinished.write_bytes(content)
         unfinished.replace(path)
     finally:
         unfinished.unlink(missing_ok=True)
-    return path
 
 
 def zipped(files: Mapping[str, bytes]) -> bytes:

@@ -94,7 +94,9 @@ class Library:
 
     @property
     def _missing(self) -> str:
-        return f"no machine code: {why_not()}; {HOW}"
+        reason = why_not()
+        how = AGAIN if reason.startswith(LEAVE_OUT) else HOW
+        return f"no machine code: {reason}; {how}; the Python FMU needs none: --fmu python, or build python"
 
     def path(self, platform: str) -> Path:
         """Of the library for a platform. Raises NotCompiledError."""
@@ -178,10 +180,12 @@ def _made_by(compiled: Sequence[str]) -> dict[str, bytes]:
 
 
 HOW = (
-    "compile it: pip install -e . (which brings the compiler)"
+    "compile it: pip install -e . (which brings the compiler, where there is one for this machine)"
     if (Path(__file__).parents[2] / "hatch_build.py").exists()
     else "install a wheel that has it: pip install --force-reinstall --only-binary :all: hovercraft-fmu"
 )
+AGAIN = "install it again without that variable (from a checkout: pip install .)"
+"""What helps where LEAVE_OUT was set."""
 
 
 def why_not() -> str:
@@ -196,7 +200,7 @@ def why_not() -> str:
 
 
 def compile_all(platforms: Iterable[str] | None = None) -> str:
-    """Compile what is not compiled yet, and forget what is stale.
+    """Compile what is not compiled yet, and then forget what is stale; where that fails, all stays.
 
     Args:
         platforms: keys of PLATFORMS; without them all.
@@ -208,13 +212,13 @@ def compile_all(platforms: Iterable[str] | None = None) -> str:
     COMPILED.mkdir(exist_ok=True)
     try:
         _compile(wanted, PLATFORMS if platforms is None else platforms)
-        reason = ""
-        (COMPILED / WHY_NOT).unlink(missing_ok=True)
     except (OSError, subprocess.SubprocessError) as error:
         reason = " ".join(str(error).split())
         (COMPILED / WHY_NOT).write_text(reason, encoding="utf-8")
+        return reason
+    (COMPILED / WHY_NOT).unlink(missing_ok=True)
     _forget({each.folder for each in wanted})
-    return reason
+    return ""
 
 
 def _forget(keep: set[Path]) -> None:
@@ -273,10 +277,10 @@ def caches(folder: Path) -> dict[str, str]:
 def _require_compiler() -> None:
     package, version = COMPILER
     if os.environ.get(LEAVE_OUT):
-        raise OSError(f"{LEAVE_OUT} is set")
+        raise OSError(f"{LEAVE_OUT} was set when the package was installed")
     try:
         found = metadata.version(package)
     except metadata.PackageNotFoundError:
-        raise OSError(f"no compiler: {package} {version} is not installed, or not to be had for this machine") from None
+        raise OSError(f"the compiler, {package} {version}, was not installed") from None
     if found != version:
-        raise OSError(f"{package} {found} is installed: must be {version}, which makes the bytes")
+        raise OSError(f"{package} {found} was installed: must be {version}, which makes the bytes")

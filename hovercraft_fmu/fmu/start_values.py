@@ -1,20 +1,21 @@
 """Start values by name, as people give them; and an FMU that has some of its own."""
 
 import keyword
+import math
+import sys
 from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
 
 from ..model.craft import preset
-from .description import NATIVE, NATIVE3, PYTHON, Flavour
+from .description import Flavour
 from .interface import BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT
 from .python.slave import HovercraftSlave
 from .variable import Enumeration
 
 Value: TypeAlias = float | int | str
 """Of a variable; an item of an enumeration may be given by its name."""
-ORDINARY = (PYTHON.identifier, NATIVE.identifier, NATIVE3.identifier)
 
 
 def start_values(given: Mapping[str, Value]) -> dict[str, float | int]:
@@ -50,6 +51,8 @@ def start_value(name: str, value: Value) -> float | int:
         raise ValueError(f"{name} = {value!r}: must be a number") from error
     if isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} = {value!r}: must be a number")
+    if isinstance(value, str) and not math.isfinite(number):  # 1e400 is said as it was typed
+        raise ValueError(f"{name} = {value}: must be a finite number, of at most {sys.float_info.max:.4g}")
     if variable.kind == "Real":
         return number
     if not number.is_integer():
@@ -76,14 +79,11 @@ def variant(
         preset_name: a craft.
 
     Raises:
-        ValueError: the name is no C identifier, or that of an FMU without start values of its own; there is no such
-            preset; a start value that the FMU would refuse.
+        ValueError: the name is no C identifier; there is no such preset; a start value that the FMU would refuse.
     """
     if not (name.isidentifier() and name.isascii()) or keyword.iskeyword(name):
         raise ValueError(f"name = {name!r}: must be a C identifier: letters, digits and _, no digit first")
-    if name in ORDINARY:
-        raise ValueError(f"name = {name!r}: must be another one: that FMU has no start values of its own")
-    craft = preset(preset_name or "textbook")
+    craft = preset("textbook" if preset_name is None else preset_name)
     starts: dict[str, float | int] = {each: getattr(craft, each) for each in CRAFT_PARAMETERS}
     starts |= start_values(own or {})
     _check(starts)
