@@ -213,6 +213,7 @@ def simulate_command(
         from .view.animation import check_animation
 
         check_animation(animation)
+    _make_room(output, plot, animation)
     runs = [plan(inputs, start_values=each, **options) for each in (start_values, *others)]
     path = _named(fmu, kind)
     results = [_simulated(run, path) for run in runs]
@@ -252,10 +253,13 @@ def drive_command(
     recorded replays to the same bits, with the command that is printed at the end.
     """
     from .view.drive import drive, plan_drive
+    from .view.window import check_display
 
     short = {"integrator": integrator, "step_size": step_size}
     start_values = _settings((*settings, *(f"{name}={value}" for name, value in short.items() if value is not None)))
     run = plan_drive(preset, start_values, communication_step)
+    check_display()
+    _make_room(record)
     path = _named(fmu, kind)
 
     def recorded(log: Path) -> None:
@@ -272,17 +276,18 @@ def drive_command(
 @click.argument("fmus", nargs=-1, metavar="[FMU ...]", type=PathOf(path_type=Path))
 @click.option("--table", is_flag=True, help="Ask other checkers and hosts, too, and print a table (Markdown).")
 def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
-    """Check FMUs: the schema, fmpy's validation, and a real run. Without FMU: build/HovercraftNative.fmu."""
-    from .building import default_fmu
-    from .validation import validate, validate_elsewhere
+    """Check FMUs: the schema, fmpy's validation, and a real run.
 
-    fmus = fmus or (default_fmu(),)
+    Without FMU: those that 'hovercraft-fmu build' wrote into build/; where there is none, build/HovercraftNative.fmu,
+    which is built. (One with --name is named.) With --table hosts run FMUs of the hovercraft alone.
+    """
+    from .building import built_fmus
+
+    chosen = fmus or built_fmus()
     if table:
-        checks = [check for fmu in fmus for check in (*validate(fmu), *validate_elsewhere(fmu))]
-        problems = sum(len(check.problems) for check in checks)
-        click.echo(_checked_table(checks))
+        problems = sum(_tabled(fmu, f"{fmu}:\n\n" if len(chosen) > 1 else "") for fmu in chosen)
     else:
-        problems = sum(_validated(fmu) for fmu in fmus)
+        problems = sum(_validated(fmu) for fmu in chosen)
     if problems:
         raise click.ClickException(f"{problems} problem{'s' if problems > 1 else ''} found")
     return 0
@@ -399,6 +404,7 @@ def sweep_command(
         from .view.plots import check_plot
 
         check_plot(plot)
+    _make_room(plot)
     path = _named(fmu, kind) if engine == "fmu" or kind else fmu
     begun = perf_counter()
     with _progress(chosen.runs, "sweeping", MofNCompleteColumn(), _Rate()) as tell:
@@ -477,15 +483,29 @@ def _tell_lines(doing: str, task: Task, ended: Event) -> None:
 
 
 def _named(fmu: Path | None, kind: "Kind | None") -> Path:
-    """The file that is to be run, and say which it is."""
+    """The file that is to be run, and say which it is. Raises as `read_description` does."""
     from .building import default_fmu
+    from .fmu.interface import HOVERCRAFT
+    from .host import read_description
 
     if fmu and kind:
         raise click.UsageError(f"--fmu {kind}: must not be given together with the file {fmu}")
     path = fmu or default_fmu(kind)
-    if path.is_file():  # what runs it says what is wrong with another
-        OUTPUT.print(f"running {path}")
+    read_description(path, model=HOVERCRAFT.name)
+    OUTPUT.print(f"running {path}")
     return path
+
+
+def _make_room(*files: Path | None) -> None:
+    """Make the folders of files that are written after a run: what cannot be is said before it."""
+    for file in filter(None, files):
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            why = f"{error.filename}: {error.strerror}"
+            raise click.ClickException(f"{file}: must be in a folder that can be made; {why}") from error
+        if file.is_dir():
+            raise click.ClickException(f"{file}: is a folder: must be the name of a file")
 
 
 def _simulated(run: "Run", fmu: Path) -> "Result":
@@ -499,14 +519,24 @@ def _validated(fmu: Path) -> int:
     """Check one FMU, print what was checked, and return the number of problems."""
     from .validation import validate
 
+    checks = validate(fmu)  # refuses what is no FMU
     OUTPUT.print(f"checking {fmu}")
     problems = 0
-    for check in validate(fmu):
+    for check in checks:
         OUTPUT.print(f"  {check.result:6} {check.what} ({check.checker} {check.version})")
         for problem in check.problems:
             OUTPUT.print(f"         {problem}")
         problems += len(check.problems)
     return problems
+
+
+def _tabled(fmu: Path, title: str) -> int:
+    """The same in a table, with the checks of others."""
+    from .validation import validate, validate_elsewhere
+
+    checks = [*validate(fmu), *validate_elsewhere(fmu)]
+    click.echo(title + _checked_table(checks))
+    return sum(len(check.problems) for check in checks)
 
 
 def _checked_table(checks: "list[Check]") -> str:

@@ -15,7 +15,7 @@ from lxml import etree
 
 from . import elsewhere
 from .fmu.interface import HOVERCRAFT
-from .host import Fmu, SimulationError, read_description
+from .host import Fmu, SimulationError, is_of, read_description
 
 STEPS = 5
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
@@ -41,13 +41,13 @@ def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
     """Run every check on an FMU, FMI 2.0 or 3.0, as co-simulation and as model exchange; one Check each, as it is done.
 
     Raises:
-        FileNotFoundError: no such file.
-        ValueError: not an archive with a model description.
+        FileNotFoundError: no such file; ValueError: not an archive with a model description. At once, before any check.
     """
     path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes them into build/")
-    description = read_description(path, validate=False)
+    return _checks(path, read_description(path, validate=False))
+
+
+def _checks(path: Path, description: Any) -> Iterator[Check]:
     version = description.fmiVersion
     yield Check("lxml", etree.__version__, f"XML schema of FMI {version}", _schema_problems(path, version))
     problems = list(fmpy.validation.validate_fmu(str(path)))
@@ -61,24 +61,27 @@ def validate(path: str | os.PathLike[str]) -> Iterator[Check]:
 
 
 def validate_elsewhere(path: str | os.PathLike[str]) -> Iterator[Check]:
-    """The checkers and hosts that others wrote, where they are installed.
+    """The checkers that others wrote and, for an FMU of the hovercraft, whose inputs are set there, the hosts.
 
-    Raises:
-        ValueError: not an FMU of the hovercraft, whose variables the hosts drive.
+    Each where it is installed. Raises as `validate` does.
     """
     path = Path(path)
-    read_description(path, validate=False, model=HOVERCRAFT.name)
-    others = elsewhere.hosts_of(path)
+    description = read_description(path, validate=False)
     toolbox = elsewhere.HOSTS["fmucontainer"]
     what, missing = "fmutool -check: schema and semantics", toolbox.missing()
     version = "" if missing else toolbox.version()
     yield Check("fmu-manipulation-toolbox", version, what, [] if missing else _fmutool_problems(path), missing)
+    if is_of(description, HOVERCRAFT.name):
+        yield from _host_checks(path)
+
+
+def _host_checks(path: Path) -> Iterator[Check]:
     try:
         expected = elsewhere.run_in("fmpy", path)
     except elsewhere.HostError as error:  # then there is nothing to compare the others with
         yield Check("fmpy", fmpy.__version__, "steps with changing inputs", [str(error)])
         return
-    for host in others.values():
+    for host in elsewhere.hosts_of(path).values():
         if host.name != "fmpy":
             yield _host_check(host, path, expected)
 

@@ -74,6 +74,35 @@ def test_build_and_validate(shell: Shell) -> None:
     printed, built = shell.ok("build", "python"), shell.folder / "build" / "Hovercraft.fmu"
     assert printed.startswith(f"build/Hovercraft.fmu: {built.stat().st_size / 1000:.0f} kB, ")
     assert shell.ok("validate", "build/Hovercraft.fmu", "build/Hovercraft.fmu").count("checking") == 2
+    checked = [line for line in shell.ok("validate").splitlines() if line.startswith("checking")]
+    assert checked == ["checking build/HovercraftNative.fmu", "checking build/Hovercraft.fmu"]
+
+
+def test_an_ssp_file_is_named_as_such(shell: Shell) -> None:
+    shell.ok("build", "python_loop")
+    for command in ("simulate", "validate"):
+        done = shell.run(command, "build/HovercraftLoop.ssp")
+        assert (done.status, done.out) == (1, "")
+        assert done.err.startswith("hovercraft-fmu: build/HovercraftLoop.ssp: is an SSP file, a loop of FMUs: must be")
+        assert "'hovercraft-fmu demo --loop'" in done.err
+
+
+@pytest.mark.usefixtures("native_at_hand")
+@pytest.mark.parametrize("option", ["--output=file/a.csv", "--plot=file/b/a.png", "--animate=file/a.gif", "--output=."])
+def test_what_cannot_be_written_is_said_before_the_run(option: str, shell: Shell) -> None:
+    (shell.folder / "file").touch()
+    done = shell.run("simulate", option)
+    assert (done.status, done.out) == (1, "")
+    assert re.fullmatch(
+        r"hovercraft-fmu: (file/.*: must be in a folder that can be made; file.*|\.: is a folder: must .*)\n", done.err
+    )
+
+
+def test_no_fmu_is_refused_before_it_is_said_to_run(shell: Shell) -> None:
+    (shell.folder / "a.fmu").write_bytes(b"no archive")
+    for name in ("a.fmu", "nix.fmu"):
+        for command in ("simulate", "validate"):
+            assert shell.run(command, name).out == ""
 
 
 def test_validate_fails_loudly(fmu: Path, shell: Shell) -> None:

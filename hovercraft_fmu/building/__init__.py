@@ -170,6 +170,15 @@ def default_fmu(kind: Kind | None = None) -> Path:
     return path
 
 
+def built_fmus() -> list[Path]:
+    """The FMUs of PRODUCTS that are in build/; where there is none the default one, which is built.
+
+    Raises as `default_fmu` does.
+    """
+    kinds = [kind for kind, each in PRODUCTS.items() if each.identity and (FOLDER / each.name).exists()]
+    return [default_fmu(kind) for kind in kinds or [default_kind()]]
+
+
 def _foreign(path: Path, expected: Product) -> str:
     """What a file that was built before is, where it is not what this package builds; '' where it is that."""
     try:

@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+import zipfile
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -80,15 +81,27 @@ def read_description(path: Path, validate: bool = True, model: str | None = None
     try:
         description = fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
+        if _is_ssp(path):
+            raise ValueError(
+                f"{path}: is an SSP file, a loop of FMUs: must be an FMU; a co-simulation master runs the loop, and so "
+                "does 'hovercraft-fmu demo --loop'"
+            ) from error
         raise ValueError(f"{path}: must be an FMU with a valid model description; {error}") from error
     if description.fmiVersion not in VERSIONS or description.coSimulation is None:
         raise ValueError(f"{path}: must be an FMU for co-simulation, FMI {' or '.join(VERSIONS)}")
-    if model and not _is_of(description, model):
+    if model and not is_of(description, model):
         raise ValueError(f"{path}: is an FMU of the model {description.modelName!r}: must be of {model!r}")
     return description
 
 
-def _is_of(description: Any, model: str) -> bool:
+def _is_ssp(path: Path) -> bool:
+    if not zipfile.is_zipfile(path):
+        return False
+    with zipfile.ZipFile(path) as archive:
+        return "SystemStructure.ssd" in archive.namelist()
+
+
+def is_of(description: Any, model: str) -> bool:
     """Whether an FMU is of a model: by the name, or, as a variant of the hovercraft has its own, by the variables."""
     names = {variable.name for variable in description.modelVariables}
     return bool(description.modelName == model or (model == HOVERCRAFT.name and HOVERCRAFT.by_name.keys() <= names))

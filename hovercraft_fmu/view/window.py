@@ -69,17 +69,26 @@ class Frame(NamedTuple):
     """What is to be told: warnings."""
 
 
+def check_display() -> None:
+    """So that no FMU need be built or loaded to learn that there is no display. Raises OSError."""
+    try:
+        pygame.display.init()
+        driver = pygame.display.get_driver()
+        pygame.display.quit()
+    except pygame.error as error:
+        raise OSError(f"no window can be opened, is there a display? {error}") from error
+    if driver in UNSEEN and "SDL_VIDEODRIVER" not in os.environ:  # SDL's last resort, unless it is asked for
+        raise OSError(f"no window can be opened, is there a display? SDL found none but {driver!r}")
+
+
 def _open(title: str) -> None:
+    check_display()
     try:
         pygame.display.init()
         pygame.display.set_caption(title)
         pygame.display.set_mode(SIZE, pygame.RESIZABLE)
     except pygame.error as error:
         raise OSError(f"no window can be opened, is there a display? {error}") from error
-    driver = pygame.display.get_driver()
-    if driver in UNSEEN and "SDL_VIDEODRIVER" not in os.environ:  # SDL's last resort, unless it is asked for
-        pygame.quit()
-        raise OSError(f"no window can be opened, is there a display? SDL found none but {driver!r}")
 
 
 class Window:
