@@ -285,7 +285,7 @@ def validate_command(fmus: tuple[Path, ...], table: bool) -> int:
 
     chosen = fmus or built_fmus()
     if table:
-        problems = sum(_tabled(fmu, f"{fmu}:\n\n" if len(chosen) > 1 else "") for fmu in chosen)
+        problems = sum(_tabled(fmu, f"\n{fmu}:\n\n" if len(chosen) > 1 else "") for fmu in chosen)
     else:
         problems = sum(_validated(fmu) for fmu in chosen)
     if problems:
