@@ -39,7 +39,7 @@ from hovercraft_fmu.model.integrators import integrator
 from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import VOYAGES, Voyage
 from hovercraft_fmu.studies import closed_loop as study
-from tests.conftest import FLAVOURS, FMI_2, ROOT
+from tests.conftest import FMI_2, ROOT
 from tests.masters import LOOPS, STEP, STEPS, VOYAGE, loop_in
 
 RK4 = Settings(0.1, integrator(3))
@@ -223,12 +223,16 @@ FMI_2_ALONE = ("libcosimpy", "fmpy.ssp")
 """libcosimpy 0.0.6 dies of an FMU of FMI 3.0 without a word; fmpy.ssp loads every FMU as one of FMI 2.0."""
 
 
+WAYS = [
+    *(("python", name) for name in ("libcosimpy, functions", "ecospy, SSP", "fmucontainer, JSON", "fmpy.ssp")),
+    *(("native", name) for name in LOOPS),
+    *(("native3", name) for name in LOOPS if not name.startswith(FMI_2_ALONE)),
+]
+"""The Python FMU, which takes a second to sail, once with every library; the native ones with all that these can."""
+
+
 @pytest.mark.once
-@pytest.mark.parametrize(
-    ("flavour", "name"),
-    [(f, name) for f in FLAVOURS for name in LOOPS if f != "native3" or not name.startswith(FMI_2_ALONE)],
-    indirect=["flavour"],
-)
+@pytest.mark.parametrize(("flavour", "name"), WAYS, indirect=["flavour"])
 def test_every_master_gives_the_bits_of_ours(
     name: str, each_fmu: Path, autopilot: Path, expected: dict[str, list[list[float]]], tmp_path: Path, fmu: Path
 ) -> None:

@@ -515,6 +515,7 @@ def test_a_chunk_has_a_bounded_size(engine: str, keep: dict[str, Any], native_fm
 
 
 @pytest.mark.once
+@pytest.mark.parametrize("flavour", ["python", "native3"], indirect=True)
 def test_the_bits_do_not_depend_on_who_makes_the_runs(each_fmu: Path, tmp_path: Path) -> None:
     """In this process; on two processes of a cluster on loopback, which get the FMU by content: its file is gone."""
     import distributed
