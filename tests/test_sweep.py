@@ -40,7 +40,7 @@ from hovercraft_fmu.sweep.engines import Plan
 from hovercraft_fmu.sweep.quantities import FORMULAS, OBSERVED
 from hovercraft_fmu.sweep.study import Factor
 from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
-from tests.conftest import ROOT
+from tests.conftest import FMI_2, ROOT
 from tests.shell import Shell
 
 COARSE = {"integrator": "rk4", "step_size": 0.1}
@@ -466,7 +466,7 @@ sweep(json.loads(sys.argv[1]), sys.argv[2], workers=1, output=sys.argv[3])
 def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> None:
     study = but(
         sweep={"mass": RANGE},
-        sampling={"method": "latin_hypercube", "runs": 32, "seed": 1},
+        sampling={"method": "latin_hypercube", "runs": 96, "seed": 1},
         keep={"distance": True, "trajectory": {"every": 30.0, "of": ["pose.x", "pose.y"]}},
     )
     there = tmp_path / "killed" / "runs"
@@ -480,7 +480,7 @@ def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> 
     made = len(list(there.glob("*.parquet")))
     assert 2 <= made < 32
     kept = {path: path.stat().st_mtime_ns for path in there.glob("*.parquet")}
-    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 32 - made
+    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 96 - 3 * made
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
     sweep(study, fmu, workers=1, output=tmp_path / "whole")
     for what in ("runs", "trajectories"):
@@ -669,6 +669,7 @@ def test_what_is_wrong_is_one_clear_line(tmp_path: Path, shell: Shell) -> None:
 
 
 @pytest.mark.once
+@FMI_2
 def test_the_quick_costs_of_a_run(tmp_path: Path, complete_native_fmu: Path) -> None:
     """Every way is measured; no clock is asserted."""
     assert complete_native_fmu.exists()
@@ -697,7 +698,7 @@ def test_stopping_is_no_harm(fmu: Path, tmp_path: Path) -> None:
     """Ctrl-C: one line, and what was made is there."""
     (tmp_path / "many.toml").write_text(
         'scene = "turn"\nset.integrator = "rk4"\nset.step_size = 0.1\nkeep.distance = true\n'
-        "sweep.mass = { from = 50, to = 200, count = 96 }\n"
+        "sweep.mass = { from = 50, to = 200, count = 300 }\n"
     )
     line = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", "sweep"]
     process = subprocess.Popen(

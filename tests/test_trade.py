@@ -31,7 +31,7 @@ from hovercraft_fmu.studies.work_precision import (
     reached,
     tolerance_errors,
 )
-from tests.conftest import ROOT
+from tests.conftest import FMI_2, ROOT
 
 RESULTS = ROOT / "hovercraft_fmu" / "studies" / "results"
 
@@ -152,6 +152,7 @@ def quick(name: str, folder: Path) -> str:
 
 
 @pytest.mark.once
+@FMI_2
 def test_the_quick_trade(tmp_path: Path, complete_native_fmu: Path) -> None:
     """What is committed was written by the same command, and tells the same of the errors."""
     assert complete_native_fmu.exists()  # so there is machine code
@@ -184,6 +185,7 @@ def numbers(row: dict[str, str]) -> dict[str, Any]:
 
 
 @pytest.mark.once
+@FMI_2
 def test_the_quick_costs_of_a_step(tmp_path: Path, complete_native_fmu: Path) -> None:
     assert complete_native_fmu.exists()
     quick("step-costs", tmp_path)
