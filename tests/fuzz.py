@@ -42,7 +42,7 @@ def fuzz(program: Path, limit: str, **env: str) -> str:
     done = subprocess.run(
         command, cwd=program.parent, env={**os.environ, **env}, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stderr[-5000:]
+    assert done.returncode == 0, done.stderr[-20000:]
     return done.stderr
 
 

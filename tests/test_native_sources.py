@@ -18,7 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from hovercraft_fmu.fmu import native_header
+from hovercraft_fmu.fmu import machine_code, native_header
+from hovercraft_fmu.fmu.block import Block
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import BY_NAME, VARIABLES
 from hovercraft_fmu.fmu.machine_code import C_FOLDER
@@ -223,7 +224,9 @@ def test_fmpy_compiles_it(each_native_fmu: Path, flavour: Flavour, tmp_path: Pat
 def test_a_real_added_to_the_table_alone_does_not_compile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its partial derivatives would be wrong."""
     extra = Variable(len(VARIABLES), "ballast", "parameter", "fixed", "kg", 1.0, "planted")
+    starts = machine_code.block_of(NATIVE, "0" * 32).starts
     monkeypatch.setattr(native_header, "VARIABLES", (*VARIABLES, extra))
+    monkeypatch.setattr(machine_code, "block_of", lambda _, build: Block("0" * 32, build, (*starts, 1.0)))
     written_sources(tmp_path)
     command = [c_compiler(), "-I.", "-c", NATIVE.unit]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
