@@ -701,9 +701,11 @@ def test_stopping_is_no_harm(fmu: Path, tmp_path: Path) -> None:
         "sweep.mass = { from = 50, to = 200, count = 300 }\n"
     )
     line = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", "sweep"]
-    process = subprocess.Popen(
-        [*line, "many.toml", str(fmu), "--workers", "1"], cwd=tmp_path, stderr=subprocess.PIPE, text=True
-    )
+    command = [*line, "many.toml", str(fmu), "--workers", "1"]
+    # a background job of a shell ignores it, and so would the sweep
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    signal.signal(signal.SIGINT, before)
     there = tmp_path / "build" / "sweep" / "many" / "runs"
     while not list(there.glob("*.parquet")):
         assert process.poll() is None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hypothesis import assume, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from hovercraft_fmu.cli import commands
@@ -43,6 +43,7 @@ EVERY = pytest.mark.parametrize("method", INTEGRATORS, ids=lambda each: each.nam
 # ---- off: not a bit
 
 
+@settings(suppress_health_check=[HealthCheck.filter_too_much])  # of older versions of hypothesis
 @given(calm_crafts, states, calm_controls)
 def test_the_general_equations_have_the_bits_of_the_special_ones(craft: Craft, state: State, asked: Controls) -> None:
     """What is left out changes no bit of what it leaves: a wind, or a drag, too small to be seen beside the rest."""
