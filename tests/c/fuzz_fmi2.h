@@ -111,7 +111,10 @@ static int completed_step(void *craft, int no_set_state_before, int null)
 {
     fmi2Boolean event = 7, end = 7;
     const fmi2Status status = fmi2CompletedIntegratorStep(craft, no_set_state_before, &event, null ? NULL : &end);
-    demand(status > fmi2Warning || (!event && !end), "an event of the step");
+    demand(status > fmi2Warning || !end, "the end of a run");
+    if (status <= fmi2Warning && event)
+        demand(call_go_to_events(craft) == CALL_OK && new_discrete_states(craft, 0) == CALL_WARNED,
+               "an event that has nothing to warn of");
     return status;
 }
 

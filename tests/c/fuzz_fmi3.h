@@ -127,7 +127,10 @@ static int completed_step(void *craft, int no_set_state_before, int null)
 {
     bool event = true, end = true;
     const int status = fmi3CompletedIntegratorStep(craft, no_set_state_before, &event, null ? NULL : &end);
-    demand(status > fmi3Warning || (!event && !end), "an event of the step");
+    demand(status > fmi3Warning || !end, "the end of a run");
+    if (status <= fmi3Warning && event)
+        demand(call_go_to_events(craft) == CALL_OK && new_discrete_states(craft, 0) == CALL_WARNED,
+               "an event that has nothing to warn of");
     return status;
 }
 
