@@ -3,7 +3,7 @@
 import itertools
 import subprocess
 from collections.abc import Iterable, Sequence
-from ctypes import CDLL, POINTER, Structure, byref, c_bool, c_char_p, c_double, c_int32, c_int64, create_string_buffer
+from ctypes import CDLL, Structure, byref, c_bool, c_char_p, c_double, c_int32, c_int64, create_string_buffer
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
@@ -80,7 +80,7 @@ class CStretch(Structure):
     _fields_ = [
         ("state", CState),
         ("substeps", c_int64),
-        ("drag_mass", c_double),
+        ("stability", c_double),
         ("rotation", c_double),
         ("proposed", c_double),
         ("substep", c_double),
@@ -101,8 +101,6 @@ class Kernel:
     def __init__(self, library: Path) -> None:
         self.library: Any = CDLL(str(library))
         self.library.kernel_loads_on.restype = CLoads
-        self.library.kernel_stability_number.restype = c_double
-        self.library.kernel_stability_number.argtypes = (c_double, c_double, POINTER(CCraft))
 
     def advance(
         self,
@@ -124,14 +122,11 @@ class Kernel:
             byref(chosen), c_double(proposed), byref(made),
         )  # fmt: skip
         reached = State(*numbers_of(made.state, State._fields))
-        return OUTCOMES[outcome], Stretch(reached, made.substeps, made.drag_mass, made.rotation, made.proposed)
+        return OUTCOMES[outcome], Stretch(reached, made.substeps, made.stability, made.rotation, made.proposed)
 
     def loads(self, state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
         arguments = byref(CState(*state)), byref(CControls(*controls)), byref(CCraft(*astuple(craft)))
         return numbers_of(self.library.kernel_loads_on(*arguments), ("x", "y", "moment", "kq"))
-
-    def stability_number(self, drag: float, rotation: float, craft: Craft) -> float:
-        return float(self.library.kernel_stability_number(drag, rotation, byref(CCraft(*astuple(craft)))))
 
 
 class Text:

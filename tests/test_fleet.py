@@ -68,7 +68,7 @@ def assert_alike(found: Any, expected: list[tuple[str, Any]], before: list[State
         if outcome == "advanced":
             assert tuple(found.states[:, i]) == stretch.state, i
             assert found.substeps[i] == stretch.substeps
-            assert (found.drag_mass[i], found.rotation[i]) == (stretch.drag_mass, stretch.rotation)
+            assert (found.stability[i], found.rotation[i]) == (stretch.stability, stretch.rotation)
             assert found.proposed[i] == stretch.proposed
         else:
             assert tuple(found.states[:, i]) == before[i]

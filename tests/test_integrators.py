@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator, integrator_number
-from hovercraft_fmu.model.subcycling import Settings, advance, stability_number
+from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import COAST_SPEED, SCENES
-from tests.strategies import controls, crafts, numbers, states
+from tests.strategies import calm_crafts, controls, crafts, numbers, rubbing_crafts, states
 from tests.test_scenes import EXACT, NAMES
 
 NONE = Controls(0.0, 0.0, 0.0)
@@ -154,12 +154,39 @@ def test_what_is_watched(each: Any) -> None:
     """Coasting slows down, so the largest number is that of the first sub-step; the spin is without drag."""
     craft = Craft(drag_center_fraction=0.0)
     stretch = advance(State(vx=1.0), NONE, craft, 0.5, Settings(0.05, each))
-    step = 0.05 if each.integrate else stretch.drag_mass / craft.drag_factor  # of the adaptive method: some step's
-    assert stability_number(stretch.drag_mass, stretch.rotation, craft) == pytest.approx(
-        step * 2.0 * craft.drag_factor / craft.mass
-    )
+    if each.integrate:
+        assert stretch.stability == pytest.approx(0.05 * 2.0 * craft.drag_factor / craft.mass)
     spin = advance(State(yaw_rate=-3.0), NONE, Craft(drag_coefficient=0.0), 0.5, Settings(0.05, each))
     assert spin.rotation == pytest.approx(0.15) if each.integrate else spin.rotation <= 1.5
+
+
+@pytest.mark.parametrize("each", FIXED, ids=lambda each: each.name)
+@given(craft=st.one_of(calm_crafts, rubbing_crafts), state=states, asked=controls)
+def test_what_is_watched_does_not_depend_on_how_the_time_is_cut(
+    each: Any, craft: Craft, state: State, asked: Controls
+) -> None:
+    """Of the sub-steps it is the largest: maxima of different ones are not put together."""
+    way = Settings(0.001, each)
+    whole = advance(state, asked, craft, 0.04, way)
+    parts = [whole._replace(state=state)]
+    for _ in range(40):
+        parts.append(advance(parts[-1].state, asked, craft, 0.001, way))
+    assert parts[-1].state == whole.state
+    assert max(part.stability for part in parts[1:]) == whole.stability
+    assert max(part.rotation for part in parts[1:]) == whole.rotation
+
+
+def test_the_fastest_drag_of_a_spin_that_speeds_up() -> None:
+    """The spin dies down while the speed grows: the number is that of one sub-step, from the formula by hand."""
+    craft = Craft(drag_center_fraction=0.0, rotational_drag=1.0)
+    state, rates = State(yaw_rate=2.0), []
+    for _ in range(41):
+        drag = 0.5 * 1.225 * 75.0 * 1.25 * state.vx
+        spin = 1.225 * 1.25 * 5.0 * 20.0**4 / 64.0
+        rates.append(2.0 * drag / 100.0 + 2.0 * spin * abs(state.yaw_rate) / 500.0)
+        state = advance(state, Controls(thrust=10.0), craft, 0.001, Settings(0.001)).state
+    made = advance(State(yaw_rate=2.0), Controls(thrust=10.0), craft, 0.04, Settings(0.001))
+    assert made.stability == pytest.approx(0.001 * max(rates), rel=1e-12)
 
 
 def test_rk4_beats_both_first_order_methods() -> None:

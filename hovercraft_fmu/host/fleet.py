@@ -33,8 +33,8 @@ class Fleet(NamedTuple):
     """Shape (6, craft): rows in the order of State; m, rad, m/s, rad/s."""
     substeps: NDArray[np.int64]
     """Shape (craft,)."""
-    drag_mass: Array
-    """kg, shape (craft,): the largest sub-step times k*q, wherever the loads were worked out and at the end."""
+    stability: Array
+    """1, shape (craft,): the largest of a sub-step, wherever the loads were worked out and at the end; see Stretch."""
     rotation: Array
     """rad, shape (craft,): the largest turn in a sub-step, there too."""
     proposed: Array
@@ -264,7 +264,7 @@ class _Way(Structure):
 
 class _CReached(Structure):
     _fields_ = [
-        ("states", c_void_p * 6), ("substeps", c_void_p), ("drag_mass", c_void_p), ("rotation", c_void_p),
+        ("states", c_void_p * 6), ("substeps", c_void_p), ("stability", c_void_p), ("rotation", c_void_p),
         ("proposed", c_void_p), ("why", c_void_p), ("part", c_void_p), ("value", c_void_p), ("substep", c_void_p),
     ]  # fmt: skip
 
@@ -337,7 +337,7 @@ class _Found:
 
     def __init__(self, count: int) -> None:
         self._states = np.empty((len(State._fields), count))
-        self._reals = {name: np.empty(count) for name in ("drag_mass", "rotation", "proposed", "value", "substep")}
+        self._reals = {name: np.empty(count) for name in ("stability", "rotation", "proposed", "value", "substep")}
         self._why, self._part = np.empty(count, np.int32), np.empty(count, np.int32)
         self._substeps = np.empty(count, np.int64)
         rows = (c_void_p * 6)(*(row.ctypes.data for row in self._states))
@@ -348,8 +348,8 @@ class _Found:
     def fleet(self, numbers: Callable[[int], dict[str, float]]) -> Fleet:
         """`numbers` gives those of a craft by name."""
         refused = Refused(np.flatnonzero(self._why), lambda i: self._error(i, numbers(i)))
-        drag_mass, rotation, proposed = (self._reals[name] for name in ("drag_mass", "rotation", "proposed"))
-        return Fleet(self._states, self._substeps, drag_mass, rotation, proposed, refused)
+        stability, rotation, proposed = (self._reals[name] for name in ("stability", "rotation", "proposed"))
+        return Fleet(self._states, self._substeps, stability, rotation, proposed, refused)
 
     def _error(self, i: int, numbers: dict[str, float]) -> Exception:
         """What the model would raise."""

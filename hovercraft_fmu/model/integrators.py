@@ -29,8 +29,15 @@ class Stretch(NamedTuple):
 
     state: State
     substeps: int
-    drag_mass: float
-    """kg: the largest h*k*q, wherever the loads were worked out and at the end"""
+    stability: float
+    """1: the largest stability number of a sub-step, wherever the loads were worked out and at the end: h times the
+    fastest linearized drag rate.
+
+    Drag k*q*(u, w) at a steady q along the motion changes by 2*k*q along it and by k*q across; a push at the drag
+    point moves the craft by 1/m and turns the point by x_d^2/I. So no rate is above 2*k*q*(1/m + x_d^2/I), k*q times
+    the craft's `drag_rate`. (With the directional area the two rates are the same.) The rotational drag d*r*|r| adds
+    2*d*|r|/I, |r| times `spin_rate`.
+    """
     rotation: float
     """rad: the largest |yaw rate|*h, there too"""
     proposed: float = 0.0
@@ -51,10 +58,12 @@ def semi_implicit_euler(state: State, controls: Controls, craft: Craft, h: float
         return _plain_euler(state, controls, craft, h, n)
     push_at = load_function(controls, craft, h / craft.mass, h / craft.inertia)
     rubbed = friction_function(craft, h) if craft.rubs else None
+    drag_rate, spin_rate = craft.drag_rate, craft.spin_rate
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
         push_x, push_y, turn, kq = push_at(heading, vx, vy, yaw_rate)
+        most = max(most, kq * drag_rate + abs(yaw_rate) * spin_rate)
         vx = vx + push_x
         vy = vy + push_y
         yaw_rate = yaw_rate + turn
@@ -63,8 +72,8 @@ def semi_implicit_euler(state: State, controls: Controls, craft: Craft, h: float
         x = x + h * vx
         y = y + h * vy
         heading = heading + h * yaw_rate
-        most, left, right = max(most, kq), min(left, yaw_rate), max(right, yaw_rate)
-    most = max(most, push_at(heading, vx, vy, yaw_rate)[3])
+        left, right = min(left, yaw_rate), max(right, yaw_rate)
+    most = max(most, push_at(heading, vx, vy, yaw_rate)[3] * drag_rate + abs(yaw_rate) * spin_rate)
     return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
 
@@ -98,7 +107,7 @@ def _plain_euler(state: State, controls: Controls, craft: Craft, h: float, n: in
             right = yaw_rate
         elif yaw_rate < left:
             left = yaw_rate
-    most = k * max(fastest, air_speed(heading, vx, vy, yaw_rate, x_d))
+    most = k * max(fastest, air_speed(heading, vx, vy, yaw_rate, x_d)) * craft.drag_rate
     return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
 
@@ -131,10 +140,12 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     cos, sin = math.cos, math.sin
     mass, inertia, x_d = craft.mass, craft.inertia, craft.drag_center
     damped, arm, square = inertia, mass * x_d * x_d, x_d * x_d
+    drag_rate, spin_rate = craft.drag_rate, craft.spin_rate
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
         kq = loads_at(heading, vx, vy, yaw_rate)[3]
+        most = max(most, kq * drag_rate + abs(yaw_rate) * spin_rate)
         c = cos(heading)
         s = sin(heading)
         g = h * kq
@@ -156,8 +167,6 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
             vx, vy = vx + wind_x, vy + wind_y
         if rubbed:
             vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
-        if kq > most:
-            most = kq
         if yaw_rate > right:
             right = yaw_rate
         elif yaw_rate < left:
@@ -165,7 +174,7 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
         x = x + h * vx
         y = y + h * vy
         heading = heading + h * yaw_rate
-    most = max(most, loads_at(heading, vx, vy, yaw_rate)[3])
+    most = max(most, loads_at(heading, vx, vy, yaw_rate)[3] * drag_rate + abs(yaw_rate) * spin_rate)
     return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
 
@@ -173,7 +182,7 @@ def rk4(state: State, controls: Controls, craft: Craft, h: float, n: int) -> Str
     """The classic Runge-Kutta method (Kutta 1901), fourth order; where friction could stop the craft, Euler's."""
     if craft.rubs:
         return _rk4_with_friction(state, controls, craft, h, n)
-    return _rk4(load_function(controls, craft, 1.0 / craft.mass, 1.0 / craft.inertia), state, h, n)
+    return _rk4(load_function(controls, craft, 1.0 / craft.mass, 1.0 / craft.inertia), craft, state, h, n)
 
 
 NEAR_REST = 4.0
@@ -185,22 +194,23 @@ def _rk4_with_friction(state: State, controls: Controls, craft: Craft, h: float,
     sliding = sliding_load_function(controls, craft, 1.0 / craft.mass, 1.0 / craft.inertia)
     radius = friction_radius(craft)
     near = NEAR_REST * max(friction_gains(craft, h))
-    drag_mass = rotation = 0.0
+    stability = rotation = 0.0
     for _ in range(n):
         if slip_speed(state.vx, state.vy, radius * state.yaw_rate) < near:
             stretch = semi_implicit_euler(state, controls, craft, h, 1)
         else:
-            stretch = _rk4(sliding, state, h, 1)
-        state, drag_mass = stretch.state, max(drag_mass, stretch.drag_mass)
+            stretch = _rk4(sliding, craft, state, h, 1)
+        state, stability = stretch.state, max(stability, stretch.stability)
         rotation = max(rotation, stretch.rotation)
-    return Stretch(state, n, drag_mass, rotation)
+    return Stretch(state, n, stability, rotation)
 
 
-def _rk4(acceleration_at: LoadFunction, state: State, h: float, n: int) -> Stretch:
+def _rk4(acceleration_at: LoadFunction, craft: Craft, state: State, h: float, n: int) -> Stretch:
     """The derivative of the pose is the velocity, so the pose needs no stages of its own:
     h/6 (v1 + 2 v2 + 2 v3 + v4) = h v + h^2/6 (a1 + a2 + a3).
     """
     half, sixth, square = 0.5 * h, h / 6.0, h * h / 6.0
+    drag_rate, spin_rate = craft.drag_rate, craft.spin_rate
     x, y, heading, vx, vy, yaw_rate = state
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
@@ -211,17 +221,19 @@ def _rk4(acceleration_at: LoadFunction, state: State, h: float, n: int) -> Stret
         ax3, ay3, m3, kq3 = acceleration_at(heading + half * r2, vx + half * ax2, vy + half * ay2, r3)
         r4 = yaw_rate + h * m3
         ax4, ay4, m4, kq4 = acceleration_at(heading + h * r3, vx + h * ax3, vy + h * ay3, r4)
+        rate1, rate2 = kq1 * drag_rate + abs(yaw_rate) * spin_rate, kq2 * drag_rate + abs(r2) * spin_rate
+        rate3, rate4 = kq3 * drag_rate + abs(r3) * spin_rate, kq4 * drag_rate + abs(r4) * spin_rate
         x = x + h * vx + square * (ax1 + ax2 + ax3)
         y = y + h * vy + square * (ay1 + ay2 + ay3)
         heading = heading + h * yaw_rate + square * (m1 + m2 + m3)
         vx = vx + sixth * (ax1 + 2.0 * ax2 + 2.0 * ax3 + ax4)
         vy = vy + sixth * (ay1 + 2.0 * ay2 + 2.0 * ay3 + ay4)
         yaw_rate = yaw_rate + sixth * (m1 + 2.0 * m2 + 2.0 * m3 + m4)
-        if not (kq1 <= most and kq2 <= most and kq3 <= most and kq4 <= most):
-            most = max(most, kq1, kq2, kq3, kq4)
+        if not (rate1 <= most and rate2 <= most and rate3 <= most and rate4 <= most):
+            most = max(most, rate1, rate2, rate3, rate4)
         if not (left <= r2 <= right and left <= r3 <= right and left <= r4 <= right and left <= yaw_rate <= right):
             left, right = min(left, r2, r3, r4, yaw_rate), max(right, r2, r3, r4, yaw_rate)
-    most = max(most, acceleration_at(heading, vx, vy, yaw_rate)[3])
+    most = max(most, acceleration_at(heading, vx, vy, yaw_rate)[3] * drag_rate + abs(yaw_rate) * spin_rate)
     return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
 
@@ -269,6 +281,7 @@ def adaptive(
     rates_at = _rate_function(controls, craft)
     reach = _reach_function(craft, tolerance)
     y = tuple(state)
+    drag_rate, spin_rate = craft.drag_rate, craft.spin_rate
     first, kq = rates_at(y)
     time, count, most, fastest = 0.0, 0, 0.0, 0.0
     while time < duration:
@@ -287,10 +300,10 @@ def adaptive(
             if proposed < MIN_STEP:
                 raise StepTooSmallError(proposed, tolerance)
             continue
-        most, fastest = max(most, h * kq), max(fastest, h * abs(y[5]))
+        most, fastest = max(most, h * (kq * drag_rate + abs(y[5]) * spin_rate)), max(fastest, h * abs(y[5]))
         time = duration if last else time + h
         y, (first, kq), count = new, rates, count + 1
-        most, fastest = max(most, h * kq), max(fastest, h * abs(y[5]))
+        most, fastest = max(most, h * (kq * drag_rate + abs(y[5]) * spin_rate)), max(fastest, h * abs(y[5]))
         if not last:  # a step cut short by the end says nothing against the one proposed
             proposed = h * min(5.0, 0.9 * math.sqrt(math.sqrt(tolerance / error)) if error else 5.0)
     return Stretch(State(*y), count, most, fastest, proposed)

@@ -121,16 +121,6 @@ def advance(
     return stretch
 
 
-def stability_number(drag: float, rotation: float, craft: Craft) -> float:
-    """1: the sub-step times the fastest linearized drag rate, from the largest h*k*q [kg] and |r|*h of a sub-step.
-
-    Drag k*q*(u, w) at a steady q along the motion changes by 2*k*q along it and by k*q across; a push at the drag
-    point moves the craft by 1/m and turns the point by x_d^2/I. So no rate is above 2*k*q*(1/m + x_d^2/I). (With the
-    directional area the two rates are the same.) The rotational drag d*r*|r| adds 2*d*|r|/I.
-    """
-    return drag * craft.drag_rate + rotation * craft.spin_rate
-
-
 def _refuse_non_finite(state: State, h: float) -> None:
     for name in ("vx", "vy", "yaw_rate", "x", "y", "heading"):  # it is a velocity that runs away first
         value = getattr(state, name)

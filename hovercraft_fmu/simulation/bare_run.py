@@ -4,7 +4,7 @@ import numpy as np
 
 from ..fmu.interface import ACTION, INPUTS, MOTION, STATES, SUBSTEPS_MAX, WATCHED
 from ..model.observation import observe_action, observe_motion
-from ..model.subcycling import advance, stability_number
+from ..model.subcycling import advance
 from .planning import Run
 from .points import controls_at, schedule
 from .result import Result
@@ -28,7 +28,7 @@ def run_model(run: Run) -> Result:
     for time, end, controls in schedule(run):
         stretch = advance(state, controls, craft, end - time, settings, proposed=proposed)
         state, proposed = stretch.state, stretch.proposed
-        stability = max(stability, stability_number(stretch.drag_mass, stretch.rotation, craft))
+        stability = max(stability, stretch.stability)
         rotation = max(rotation, stretch.rotation)
         count = min(count + stretch.substeps, SUBSTEPS_MAX)
         rows.append(row(end))

@@ -54,16 +54,16 @@ def chosen(batch: Batch, which: Any) -> Batch:
 
 
 def advanced(batch: Batch, method: Integrator, state: State, n: int, refined: int = 1) -> tuple[State, Array, Array]:
-    """Every craft n sub-steps after a state, each cut into so many; drag mass [kg], rotation [rad].
+    """Every craft n sub-steps after a state, each cut into so many; stability number, rotation [rad].
 
     NaN where a motion left the numbers.
     """
     h = batch.h / refined
     fleet = advance_fleet(state, batch.controls, batch.craft, h * (n * refined), Settings(h, method))
     lost = fleet.refused.numbers
-    for values in (*fleet.states, fleet.drag_mass, fleet.rotation):
+    for values in (*fleet.states, fleet.stability, fleet.rotation):
         values[lost] = np.nan
-    return State(*fleet.states), fleet.drag_mass, fleet.rotation
+    return State(*fleet.states), fleet.stability, fleet.rotation
 
 
 def pushes(batch: Batch) -> tuple[Array, Array, Array]:
@@ -165,23 +165,22 @@ class Numbers(NamedTuple):
 def watched(runs: Batch, method: Integrator) -> Numbers:
     """Make all sub-steps, and watch."""
     state, craft, h = runs.start, runs.craft, runs.h
-    sigma = drag = rho = np.zeros_like(h)
+    sigma = rho = np.zeros_like(h)
     wind = np.hypot(runs.controls.wind_x, runs.controls.wind_y)
     speed = np.fmax(_size(state.vx, state.vy, state.yaw_rate, craft), wind)
     finite = np.ones(h.shape, bool)
     with np.errstate(all="ignore"):
         for _ in range(runs.substeps):
-            state, drag_mass, rotation = advanced(runs, method, state, 1)
-            sigma = np.fmax(sigma, drag_mass * craft.drag_rate + rotation * craft.spin_rate)
-            drag, rho = np.fmax(drag, drag_mass), np.fmax(rho, rotation)
+            state, stability, rotation = advanced(runs, method, state, 1)
+            sigma, rho = np.fmax(sigma, stability), np.fmax(rho, rotation)
             speed = np.fmax(speed, _size(state.vx, state.vy, state.yaw_rate, craft))
             finite &= np.isfinite(np.sum(state, axis=0))
         alpha, phi = _per(_gain(runs), speed), _per(_grip(runs), speed)
-        return Numbers(state, sigma, rho, _swing(runs, drag), alpha, phi, speed, finite)
+        return Numbers(state, sigma, rho, _swing(runs, sigma / craft.drag_rate), alpha, phi, speed, finite)
 
 
 def _swing(runs: Batch, drag: Array) -> Array:
-    """1: tau, from the largest h*k*q [kg]; k*q^2 = (k*q)^2/k, and without drag nothing."""
+    """1: tau, from a bound of h*k*q [kg]; k*q^2 = (k*q)^2/k, and without drag nothing."""
     craft, k = runs.craft, runs.craft.drag_factor
     turn = np.abs(pushes(runs)[2])
     least = np.where(craft.drag_area == DIRECTIONAL, np.fmin(craft.drag_factor_ahead, craft.drag_factor_abeam), k)

@@ -110,21 +110,16 @@ class _Batch:
             self._states, controls, self._crafts, leg.end - leg.time, self._settings, proposed=self._proposed
         )
         self._states, self._proposed = fleet.states, fleet.proposed
-        number = self._stability_number(fleet.drag_mass, fleet.rotation)
         for i, why in fleet.refused.items():
             self._errors.setdefault(i, _said(why, leg.time))
-        for i in np.flatnonzero(~np.isfinite(number)).tolist():
-            self._errors.setdefault(i, _watched(number[i].item(), fleet.rotation[i].item(), self._settings, leg))
-        self._stability = np.maximum(self._stability, number)
+        stability, rotation = fleet.stability, fleet.rotation
+        for i in np.flatnonzero(~(np.isfinite(stability) & np.isfinite(rotation))).tolist():
+            self._errors.setdefault(i, _watched(stability[i].item(), rotation[i].item(), self._settings, leg))
+        self._stability = np.maximum(self._stability, fleet.stability)
         self._rotation = np.maximum(self._rotation, fleet.rotation)
         self._substeps += fleet.substeps
         for value, limit in zip(controls[:3], self._saturated(controls), strict=True):
             self._held |= np.abs(value - limit) > HELD * np.maximum(1.0, np.abs(limit))
-
-    def _stability_number(self, drag_mass: Array, rotation: Array) -> Array:
-        """As model/subcycling.py has it."""
-        derived = self._crafts.derived
-        return drag_mass * derived["drag_rate"] + rotation * derived["spin_rate"]
 
     def _saturated(self, controls: Controls) -> list[Array]:
         thrust = np.clip(controls.thrust, self._parameters["thrust_min"], self._parameters["thrust_max"])

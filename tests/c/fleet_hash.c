@@ -74,7 +74,7 @@ static uint64_t hash_of(int method, const double *slopes)
     static const double step = 0.3, size = 0.01, tolerance = 1e-6, nothing = 0.0;
     struct fleet fleet = {.count = COUNT};
     const struct way way = {{&step, 0}, {&size, 0}, {&tolerance, 0}, {&nothing, 0}, method};
-    struct reached reached = {.substeps = counts, .drag_mass = reals[0], .rotation = reals[1], .proposed = reals[2],
+    struct reached reached = {.substeps = counts, .stability = reals[0], .rotation = reals[1], .proposed = reals[2],
                               .why = whys, .part = parts, .value = reals[3], .substep = reals[4]};
     for (int k = 0; k < FLEET_STATES; k++) {
         fleet.states[k] = (struct column){states[k], 1};

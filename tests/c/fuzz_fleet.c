@@ -22,7 +22,7 @@ static int64_t advanced(int64_t first, int64_t count, int strides, int method, i
     static int32_t parts[MOST];
     struct fleet fleet = {.count = count};
     struct way way = {.integrator = method};
-    struct reached reached = {.substeps = counts, .drag_mass = reals[0], .rotation = reals[1], .proposed = reals[2],
+    struct reached reached = {.substeps = counts, .stability = reals[0], .rotation = reals[1], .proposed = reals[2],
                               .why = why, .part = parts, .value = reals[3], .substep = reals[4]};
     int k = 0;
     for (int i = 0; i < FLEET_STATES; i++) {

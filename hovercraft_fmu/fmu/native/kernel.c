@@ -192,6 +192,7 @@ struct load_function {
     double ahead, abeam, x_d;  /* kg/m, kg/m, m */
     double drag, turning_drag; /* k, and k*x_d */
     double spin;               /* of the rotational drag */
+    double drag_rate, spin_rate; /* 1/kg, 1: of the stability number, see integrators.py */
     double grip, turning_grip; /* of friction: its force, and force*radius */
     double radius;             /* m: of friction */
     double thrust, side, turn;
@@ -238,6 +239,8 @@ static struct load_function load_function(const struct drive *drive, const struc
     struct load_function f = {.per_mass = per_mass, .per_inertia = per_inertia, .craft = craft, .drive = drive};
     f.k = drag_factor(craft);
     f.x_d = drag_center(craft);
+    f.drag_rate = drag_rate(craft);
+    f.spin_rate = spin_rate(craft);
     f.kind = f.k == 0.0 ? WITHOUT_DRAG : has_plain_drag(craft) && !is_windy(drive) ? PLAIN_DRAG : ANY_DRAG;
     if (f.kind == ANY_DRAG) {
         f.ahead = drag_factor_ahead(craft);
@@ -407,13 +410,20 @@ void kernel_body_velocity(const struct state *state, double *surge, double *sway
 
 /* What is watched over a stretch. */
 struct watch {
-    double most;        /* kg/s: the largest k*q */
+    double most;        /* 1/s: the fastest drag; of plain drag the largest k*q [kg/s], which is times one constant */
     double left, right; /* rad/s: the least and the largest yaw rate */
 };
 
-static inline void watch_loads(struct watch *watch, double kq)
+/* 1/s: no linearized drag is faster; see integrators.py. */
+static inline double fastest_rate(const struct load_function *f, double kq, double yaw_rate)
 {
-    watch->most = larger(watch->most, kq);
+    return kq * f->drag_rate + fabs(yaw_rate) * f->spin_rate;
+}
+
+static ALWAYS_INLINE void watch_loads(struct watch *watch, const struct load_function *f, enum drag_kind kind,
+                                      double kq, double yaw_rate)
+{
+    watch->most = larger(watch->most, kind == PLAIN_DRAG ? kq : fastest_rate(f, kq, yaw_rate));
 }
 
 static inline void watch_yaw_rate(struct watch *watch, double yaw_rate)
@@ -423,13 +433,13 @@ static inline void watch_yaw_rate(struct watch *watch, double yaw_rate)
 }
 
 static struct stretch stretch_of(struct load_function *f, const struct state *s, int64_t n, double h,
-                                 const struct watch *watch)
+                                 struct watch *watch)
 {
-    const double most = larger(watch->most, loads_at(f, s->heading, s->vx, s->vy, s->yaw_rate).kq);
+    watch_loads(watch, f, f->kind, loads_at(f, s->heading, s->vx, s->vy, s->yaw_rate).kq, s->yaw_rate);
     return (struct stretch){
         .state = *s,
         .substeps = n,
-        .drag_mass = h * most,
+        .stability = h * (f->kind == PLAIN_DRAG ? watch->most * f->drag_rate : watch->most),
         .rotation = h * larger(watch->right, -watch->left),
         .substep = h,
     };
@@ -444,6 +454,7 @@ static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, const struct s
     for (int64_t i = 0; i < n; i++) {
         steer_at(f, (double)i * h);
         const struct loads push = loads_as(f, kind, false, s.heading, s.vx, s.vy, s.yaw_rate);
+        watch_loads(&watch, f, kind, push.kq, s.yaw_rate);
         s.vx = s.vx + push.x;
         s.vy = s.vy + push.y;
         s.yaw_rate = s.yaw_rate + push.moment;
@@ -452,7 +463,6 @@ static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, const struct s
         s.x = s.x + h * s.vx;
         s.y = s.y + h * s.vy;
         s.heading = s.heading + h * s.yaw_rate;
-        watch_loads(&watch, push.kq);
         watch_yaw_rate(&watch, s.yaw_rate);
     }
     return stretch_of(f, &s, n, h, &watch);
@@ -480,6 +490,7 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
         const double c = turned.cosine, s = turned.sine;
         const double kq = f->k * air_at(f, f->kind, c, s, z.vx, z.vy, z.yaw_rate).q;
         const double g = h * kq;
+        watch_loads(&watch, f, f->kind, kq, z.yaw_rate);
         if (in_wind) {
             z.vx = z.vx - f->wind_x;
             z.vy = z.vy - f->wind_y;
@@ -506,7 +517,6 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
         z.x = z.x + h * z.vx;
         z.y = z.y + h * z.vy;
         z.heading = z.heading + h * z.yaw_rate;
-        watch_loads(&watch, kq);
         watch_yaw_rate(&watch, z.yaw_rate);
     }
     return stretch_of(f, &z, n, h, &watch);
@@ -534,16 +544,16 @@ static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, bool slides, con
         steer_at(f, t + h);
         const struct loads a4 = loads_as(f, kind, slides, s.heading + h * r3, s.vx + h * a3.x,
                                                  s.vy + h * a3.y, r4);
+        watch_loads(&watch, f, kind, a1.kq, s.yaw_rate);
+        watch_loads(&watch, f, kind, a2.kq, r2);
+        watch_loads(&watch, f, kind, a3.kq, r3);
+        watch_loads(&watch, f, kind, a4.kq, r4);
         s.x = s.x + h * s.vx + square * (a1.x + a2.x + a3.x);
         s.y = s.y + h * s.vy + square * (a1.y + a2.y + a3.y);
         s.heading = s.heading + h * s.yaw_rate + square * (a1.moment + a2.moment + a3.moment);
         s.vx = s.vx + sixth * (a1.x + 2.0 * a2.x + 2.0 * a3.x + a4.x);
         s.vy = s.vy + sixth * (a1.y + 2.0 * a2.y + 2.0 * a3.y + a4.y);
         s.yaw_rate = s.yaw_rate + sixth * (a1.moment + 2.0 * a2.moment + 2.0 * a3.moment + a4.moment);
-        watch_loads(&watch, a1.kq);
-        watch_loads(&watch, a2.kq);
-        watch_loads(&watch, a3.kq);
-        watch_loads(&watch, a4.kq);
         watch_yaw_rate(&watch, r2);
         watch_yaw_rate(&watch, r3);
         watch_yaw_rate(&watch, r4);
@@ -573,7 +583,7 @@ static struct stretch rk4_with_friction(const struct state *state, const struct 
         free.begun = sliding.begun = (double)i * h;
         const struct stretch one = at_rest ? semi_implicit_euler(s, &free, h, 1) : smooth_rk4(s, &sliding, h, 1);
         whole.state = one.state;
-        whole.drag_mass = larger(whole.drag_mass, one.drag_mass);
+        whole.stability = larger(whole.stability, one.stability);
         whole.rotation = larger(whole.rotation, one.rotation);
     }
     return whole;
@@ -727,14 +737,14 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
             }
             continue;
         }
-        most = larger(most, h * stages[0].kq);
+        most = larger(most, h * fastest_rate(&f, stages[0].kq, y[YAW_RATE]));
         fastest = larger(fastest, h * fabs(y[YAW_RATE]));
         time = last ? duration : time + h;
         for (int i = 0; i < COMPONENTS; i++)
             y[i] = new[i];
         stages[0] = stages[STAGES - 1];
         count++;
-        most = larger(most, h * stages[0].kq);
+        most = larger(most, h * fastest_rate(&f, stages[0].kq, y[YAW_RATE]));
         fastest = larger(fastest, h * fabs(y[YAW_RATE]));
         if (!last) /* a step cut short by the end says nothing against the one proposed */
             proposed = h * smaller(5.0, error > 0.0 ? 0.9 * square_root(square_root(tolerance / error)) : 5.0);
@@ -742,7 +752,7 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
     *stretch = (struct stretch){
         .state = state_of(y),
         .substeps = count,
-        .drag_mass = most,
+        .stability = most,
         .rotation = fastest,
         .proposed = proposed,
     };
@@ -804,9 +814,4 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
         *stretch = semi_implicit_euler(state, &f, h, n);
     }
     return checked(stretch);
-}
-
-double kernel_stability_number(double drag, double rotation, const struct craft *craft)
-{
-    return drag * drag_rate(craft) + rotation * spin_rate(craft);
 }

@@ -77,7 +77,7 @@ struct settings {
 struct stretch {
     struct state state;
     int64_t substeps;
-    double drag_mass; /* kg: the largest h*k*q, wherever the loads were worked out and at the end */
+    double stability; /* 1: the largest of a sub-step, wherever the loads were worked out and at the end */
     double rotation; /* rad: the largest |yaw rate|*h, there too */
     double proposed; /* s: the step that the adaptive method would take next */
     double substep;  /* s: the sub-step that was taken, or the one that is too small */
@@ -108,7 +108,6 @@ HIDDEN struct loads kernel_loads_on(const struct state *state, const struct cont
                                     const struct craft *craft);
 /* Surge and sway [m/s]. */
 HIDDEN void kernel_body_velocity(const struct state *state, double *surge, double *sway);
-HIDDEN double kernel_stability_number(double drag, double rotation, const struct craft *craft);
 
 /* The state one communication step [s], greater than 0, later. `proposed` [s] is what the last stretch of the adaptive
    method returned, 0 at the start. */

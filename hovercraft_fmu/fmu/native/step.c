@@ -49,13 +49,12 @@ static enum verdict refuse_step(struct instance *instance, enum outcome outcome,
     return refuse_motion(instance, stretch);
 }
 
-/* What is watched over a step may overflow where the motion just does not; an infinite rotation leaves no finite
-   stability number. */
+/* What is watched over a step may overflow where the motion just does not. */
 static enum verdict check_watched(struct instance *instance, double stability, double rotation)
 {
     const bool turns = !isfinite(rotation);
     const double time = instance->now.time;
-    if (isfinite(stability))
+    if (isfinite(stability) && !turns)
         return FINE;
     return instance_say(instance, REFUSED,
                         "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
@@ -192,8 +191,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
         kernel_advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
     if (outcome != ADVANCED)
         return refuse_step(instance, outcome, step, &stretch);
-    const double stability = kernel_stability_number(stretch.drag_mass, stretch.rotation, &craft);
-    if (check_watched(instance, stability, stretch.rotation) == REFUSED)
+    if (check_watched(instance, stretch.stability, stretch.rotation) == REFUSED)
         return REFUSED;
     now->state = stretch.state;
     now->proposed = stretch.proposed;
@@ -202,7 +200,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->tuned = false;
     now->time = point + step;
     now->motion_unread = now->action_unread = true;
-    now->stability = larger(now->stability, stability);
+    now->stability = larger(now->stability, stretch.stability);
     now->rotation = larger(now->rotation, stretch.rotation);
     now->inputs = end; /* a ramp goes on from here */
     now->rated = 0;

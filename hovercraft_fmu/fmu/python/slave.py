@@ -13,7 +13,6 @@ from ...model.subcycling import (
     advance,
     check_step_size,
     check_tolerance,
-    stability_number,
 )
 from ..interface import (
     ACTION,
@@ -74,10 +73,10 @@ class HovercraftSlave(Slave):
             stretch = advance(self._state, controls, craft, step_size, self._settings, proposed=self._proposed)
         except NonFiniteError as error:
             self._refuse_motion(error)
-        stability, rotation = stability_number(stretch.drag_mass, stretch.rotation, craft), stretch.rotation
-        if not stability < math.inf:
+        state, n, stability, rotation, proposed = stretch
+        if not (stability < math.inf and rotation < math.inf):
             self._refuse_watched(stability, rotation)
-        self._state, n, _, _, self._proposed = stretch
+        self._state, self._proposed = state, proposed
         self._controls, self._craft, self._tuned = controls, craft, False
         self._integers[SUBSTEPS] += n
         if self._integers[SUBSTEPS] > SUBSTEPS_MAX:
@@ -136,9 +135,7 @@ class HovercraftSlave(Slave):
         ) from error
 
     def _refuse_watched(self, stability: float, rotation: float) -> NoReturn:
-        """What is watched over a step may overflow where the motion just does not; an infinite rotation leaves no
-        finite stability number.
-        """
+        """What is watched over a step may overflow where the motion just does not."""
         watched = zip(WATCHED, (stability, rotation), strict=True)
         name, value = next((name, value) for name, value in reversed(list(watched)) if not math.isfinite(value))
         raise ValueError(

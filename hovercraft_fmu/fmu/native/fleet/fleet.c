@@ -228,7 +228,7 @@ static bool settle(const struct fleet *fleet, const struct reached *reached, int
     reached->value[i] = why == RUNAWAY ? values[part] : 0.0;
     reached->substep[i] = stretch->substep;
     reached->substeps[i] = moved ? stretch->substeps : 0;
-    reached->drag_mass[i] = moved ? stretch->drag_mass : 0.0;
+    reached->stability[i] = moved ? stretch->stability : 0.0;
     reached->rotation[i] = moved ? stretch->rotation : 0.0;
     reached->proposed[i] = stretch->proposed;
     return !moved;
@@ -258,7 +258,7 @@ struct block {
     int filled;
     int64_t n;              /* sub-steps, of each */
     int64_t craft[LANES];
-    double h[LANES], k[LANES];
+    double h[LANES];
     struct state states[LANES];
     struct load_function loads[LANES];
 };
@@ -283,7 +283,6 @@ static bool joins(struct block *block, const struct fleet *fleet, const struct w
     block->n = n;
     block->craft[lane] = i;
     block->h[lane] = h;
-    block->k[lane] = f.k;
     block->states[lane] = state_at(fleet, i);
     block->loads[lane] = f;
     return true;
@@ -334,7 +333,7 @@ static int64_t advance_block(struct block *block, const struct fleet *fleet, con
         struct stretch made = {
             .state = {z.x[i], z.y[i], z.heading[i], z.vx[i], z.vy[i], z.yaw_rate[i]},
             .substeps = block->n,
-            .drag_mass = h[i] * (block->k[i] * z.fastest[i]),
+            .stability = h[i] * (block->loads[i].k * z.fastest[i] * block->loads[i].drag_rate),
             .rotation = h[i] * larger(z.right[i], -z.left[i]),
             .substep = h[i],
         };
@@ -368,7 +367,7 @@ static bool can_be_reached(const struct reached *reached)
     for (int k = 0; k < FLEET_STATES; k++)
         if (!reached->states[k])
             return false;
-    return reached->substeps && reached->drag_mass && reached->rotation && reached->proposed && reached->why &&
+    return reached->substeps && reached->stability && reached->rotation && reached->proposed && reached->why &&
            reached->part && reached->value && reached->substep;
 }
 

@@ -33,7 +33,7 @@ struct way {
 struct reached {
     double *states[FLEET_STATES];
     int64_t *substeps;
-    double *drag_mass; /* kg */
+    double *stability; /* 1 */
     double *rotation;  /* rad */
     double *proposed;  /* s */
     int32_t *why;      /* enum refusal */
