@@ -18,7 +18,7 @@ from pathlib import Path
 
 from .archive import digest, write_archive
 from .block import Block, block
-from .description import NATIVE, NATIVE3, Flavour, model_description, xml
+from .description import NATIVE, NATIVE3, PARTS, Flavour, model_description, xml
 from .native_header import variables_header
 
 COMPILER = ("ziglang", "0.17.1")
@@ -80,7 +80,7 @@ class Library:
     sources: tuple[str, ...]
     """The files to compile."""
     files: Mapping[str, bytes] = field(repr=False)
-    """All that the compiler reads, by name: these and what they include."""
+    """All that the compiler reads, by path: these and what they include."""
 
     @cached_property
     def folder(self) -> Path:
@@ -117,7 +117,28 @@ def libraries() -> list[Library]:
 
 def library(flavour: Flavour) -> Library:
     """Of a native FMU."""
-    return Library(flavour.identifier, (flavour.unit,), {**sources(identity(flavour), flavour), **headers(flavour)})
+    own = {**sources(identity(flavour), flavour), **headers(flavour)}
+    files = {
+        **{f"{SHARED}/{name}": content for name, content in sources("0" * 32).items()},
+        **{f"{flavour.identifier}/{name}": content for name, content in own.items()},
+        **_units(flavour),
+    }
+    return Library(flavour.identifier, tuple(_units(flavour)), files)
+
+
+SHARED = "shared"
+"""The folder of what both flavours have to the letter: the second time it is in the compiler's cache."""
+
+
+def _units(flavour: Flavour) -> dict[str, bytes]:
+    """What a library is compiled of, by path: what both flavours share, and what they do not."""
+    shared, own = [name for name in PARTS if name != "variant.c"], [flavour.parts[0], "variant.c"]
+    units = {f"{SHARED}/shared.c": shared, f"{flavour.identifier}/library.c": own}
+    return {path: _includes(names).encode() for path, names in units.items()}
+
+
+def _includes(names: Iterable[str]) -> str:
+    return "\n".join(f'#include "{name}"' for name in names)
 
 
 UNIT = """\
@@ -140,15 +161,14 @@ def fleet_library() -> Library:
     """Of many craft at once: host/fleet.py loads it."""
     kernel = [C_FOLDER / f"{name}.{suffix}" for name in ("kernel", "logarithm", "memory", "trig") for suffix in "ch"]
     kernel += [C_FOLDER / f"{name}.h" for name in ("environment", "hidden", "root")]
-    files = {file.name: file.read_bytes() for file in (*kernel, *sorted((C_FOLDER / "fleet").iterdir()))}
-    return Library("HovercraftFleet", ("fleet.c", "memory.c"), files)
+    files = {f"fleet/{file.name}": file.read_bytes() for file in (*kernel, *sorted((C_FOLDER / "fleet").iterdir()))}
+    return Library("HovercraftFleet", ("fleet/fleet.c", "fleet/memory.c"), files)
 
 
 def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
     """The C of an FMU, by name, without the standard's headers; `build` is a hexadecimal digest of 32 digits."""
     files = [C_FOLDER / name for name in flavour.parts] + sorted(C_FOLDER.glob("*.h"))
-    includes = "\n".join(f'#include "{name}"' for name in flavour.parts)
-    unit = UNIT.format(fmi=flavour.fmi, identifier=flavour.identifier, includes=includes)
+    unit = UNIT.format(fmi=flavour.fmi, identifier=flavour.identifier, includes=_includes(flavour.parts))
     return {
         **{file.name: file.read_bytes() for file in files},
         "variables.h": variables_header(block_of(flavour, build)).encode(),
@@ -169,7 +189,8 @@ def block_of(flavour: Flavour, build: str) -> Block:
 def identity(flavour: Flavour) -> str:
     """What the FMU is: a digest of code, table, compiler and options, but of nothing that is written about it."""
     table = xml(model_description("0" * 32, flavour))
-    return digest({**sources("0" * 32, flavour), **headers(flavour), **_made_by((flavour.unit,)), "table": table})
+    units = _units(flavour)
+    return digest({**sources("0" * 32, flavour), **headers(flavour), **units, **_made_by(tuple(units)), "table": table})
 
 
 def _made_by(compiled: Sequence[str]) -> dict[str, bytes]:
@@ -230,29 +251,28 @@ def _forget(keep: set[Path]) -> None:
 
 def _compile(wanted: Sequence[Library], platforms: Iterable[str]) -> None:
     """All libraries and platforms side by side; each file is written at once or not at all."""
-    jobs = [(each, platform) for platform in platforms for each in wanted if not each.file(platform).exists()]
+    jobs = [(each, platform) for each in wanted for platform in platforms if not each.file(platform).exists()]
     if not jobs:
         return
     _require_compiler()
     with tempfile.TemporaryDirectory(prefix="hovercraft_native_") as place, ThreadPoolExecutor(os.cpu_count()) as pool:
         folder = Path(place)
-        for each in {each.name: each for each, _ in jobs}.values():
-            (folder / each.name).mkdir()
-            for name, content in each.files.items():
-                (folder / each.name / name).write_bytes(content)
+        for name, content in {name: content for each, _ in jobs for name, content in each.files.items()}.items():
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_bytes(content)
         for outcome in [pool.submit(_compile_one, each, platform, folder) for each, platform in jobs]:
             outcome.result()
 
 
 def _compile_one(each: Library, name: str, folder: Path) -> None:
     platform, path = PLATFORMS[name], each.file(name)
-    made = folder / f"{each.name}-{name}"
+    made = folder / f"{each.name}-{name}"  # a folder, for what else the linker leaves beside it
     made.mkdir()
     command = [*compiler(platform), *LIBRARY_OPTIONS, *each.sources, *platform.options]
     if platform.suffix == ".dylib":
         command.append(f"-Wl,-install_name,@rpath/{path.name}")
     done = subprocess.run(
-        [*command, "-o", f"../{made.name}/{path.name}"], cwd=folder / each.name,
+        [*command, "-o", f"{made.name}/{path.name}"], cwd=folder,
         env={**os.environ, **caches(folder / "cache")}, capture_output=True, text=True, check=False, timeout=TIME_LIMIT,
     )  # fmt: skip
     if done.returncode != 0:
