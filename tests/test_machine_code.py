@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from hovercraft_fmu import cli
 from hovercraft_fmu.building import PRODUCTS, build
 from hovercraft_fmu.fmu import machine_code
-from hovercraft_fmu.fmu.description import NATIVE
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3
 from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all, library
 
 
@@ -53,6 +53,15 @@ def test_changed_c_is_never_run_as_old_machine_code(tmp_path: Path, monkeypatch:
     with pytest.raises(NotCompiledError, match=r"compiling .* for x86_64-linux-gnu\.2\.17 failed: .*on purpose"):
         library(NATIVE).path("x86_64-linux")
     assert last.exists()  # the last good state: taking the change back is enough
+
+
+def test_both_flavours_share_a_unit_that_is_compiled_once() -> None:
+    """The compiler's cache goes by the content of all that it reads."""
+    units = {name: library(flavour).files for name, flavour in (("2", NATIVE), ("3", NATIVE3))}
+    shared = {name: {path: f for path, f in files.items() if "shared/" in path} for name, files in units.items()}
+    assert library(NATIVE).sources[0] == library(NATIVE3).sources[0] == "shared/shared.c"
+    assert {"shared/shared.c", "shared/kernel.c", "shared/variables.h"} <= shared["2"].keys()
+    assert shared["2"] == shared["3"]
 
 
 @pytest.mark.parametrize(
