@@ -1,5 +1,6 @@
 """Machine code: compiled once, carried by the wheel, never run where the C has changed since."""
 
+import runpy
 import shutil
 from pathlib import Path
 
@@ -62,6 +63,16 @@ def test_both_flavours_share_a_unit_that_is_compiled_once() -> None:
     assert library(NATIVE).sources[0] == library(NATIVE3).sources[0] == "shared/shared.c"
     assert {"shared/shared.c", "shared/kernel.c", "shared/variables.h"} <= shared["2"].keys()
     assert shared["2"] == shared["3"]
+
+
+@pytest.mark.parametrize(("reason", "status"), [("", 0), ("it failed", "it failed")])
+def test_the_command_ends_well_where_it_compiled(
+    monkeypatch: pytest.MonkeyPatch, reason: str, status: int | str
+) -> None:
+    monkeypatch.setattr(machine_code, "compile_all", lambda: reason)
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("hovercraft_fmu.fmu", run_name="__main__")
+    assert ended.value.code == status
 
 
 @pytest.mark.parametrize(

@@ -4,4 +4,4 @@ import sys
 
 from .machine_code import compile_all
 
-sys.exit(compile_all())
+sys.exit(compile_all() or 0)
