@@ -17,7 +17,7 @@ from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
 from .host import Fmu, Instance
 from .model.craft import Craft
 from .model.dynamics import Controls, State
-from .model.subcycling import Settings, advance
+from .model.subcycling import Settings, advance, meant_step
 from .scenes import Voyage, voyage
 from .simulation import Progress, path_length, write_csv
 
@@ -237,9 +237,10 @@ class BareCraft:
         """See Part."""
         self.controls = Controls(*values, *self.wind)
 
-    def step(self, _time: float, duration: float) -> None:
+    def step(self, time: float, duration: float) -> None:
         """See Part."""
-        made = advance(self.state, self.controls, self.craft, duration, self.settings, proposed=self.proposed)
+        step = meant_step(time, duration, 0.0, self.settings.step_size)
+        made = advance(self.state, self.controls, self.craft, step, self.settings, proposed=self.proposed)
         self.state, self.proposed = made.state, made.proposed
 
 

@@ -101,6 +101,8 @@ class Kernel:
     def __init__(self, library: Path) -> None:
         self.library: Any = CDLL(str(library))
         self.library.kernel_loads_on.restype = CLoads
+        for function, arguments in ((self.library.kernel_rounding, 3), (self.library.kernel_meant_step, 4)):
+            function.restype, function.argtypes = c_double, (c_double,) * arguments
 
     def advance(
         self,
@@ -123,6 +125,14 @@ class Kernel:
         )  # fmt: skip
         reached = State(*numbers_of(made.state, State._fields))
         return OUTCOMES[outcome], Stretch(reached, made.substeps, made.stability, made.rotation, made.proposed)
+
+    def rounding(self, *arguments: float) -> float:
+        """As in subcycling.py."""
+        return float(self.library.kernel_rounding(*arguments))
+
+    def meant_step(self, *arguments: float) -> float:
+        """As in subcycling.py."""
+        return float(self.library.kernel_meant_step(*arguments))
 
     def loads(self, state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
         arguments = byref(CState(*state)), byref(CControls(*controls)), byref(CCraft(*astuple(craft)))

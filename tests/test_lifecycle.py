@@ -621,21 +621,72 @@ def test_no_step_leads_past_the_stop_time(instance: Any, messages: list[str]) ->
             instance.doStep(0.9, 0.2)
         assert messages[-1] == ("communicationStepSize = 0.2 s from 0.9 s: must not lead past stopTime = 1.0 s")
         assert everything(instance) == before
-    instance.doStep(0.9, 0.1 + 1e-10)
+    instance.doStep(0.9, 0.1 + 1e-16)
     instance.reset()
     start(instance)
     instance.doStep(0.0, 2.0)
 
 
 def test_a_start_time_other_than_zero(instance: Any) -> None:
+    """A host that passes differences of times: the bits are those of a start at 0, and so is the count."""
     ends = []
-    for time in (0.0, -5.0, 1e6):
+    for time in (0.0, -5.0, 86_400.0, 1.7e9):
         instance.reset()
         start(instance, time)
-        for k in range(10):
-            instance.doStep(time + k * 0.1, 0.1)
-        ends.append(get(instance, *STATES))
-    assert ends == [ends[0]] * 3
+        for k in range(300):
+            point = time + k * 0.001
+            instance.doStep(point, time + (k + 1) * 0.001 - point)
+        ends.append([*get(instance, *STATES), count(instance)])
+    assert ends[0][-1] == 300
+    assert ends == [ends[0]] * 4
+
+
+@pytest.mark.parametrize("time", [0.0, 86_400.0, 1.7e9])
+def test_another_time_is_refused_wherever_the_time_starts(time: float, instance: Any, messages: list[str]) -> None:
+    instance.setupExperiment(startTime=time, stopTime=time + 1.0)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    instance.doStep(time, 0.5)
+    for point in (time, time + 0.49, time + 0.501, time + 2.0, math.nan):
+        with pytest.raises(FMICallException):
+            instance.doStep(point, 0.1)
+        assert (
+            messages[-1]
+            == f"currentCommunicationPoint = {point!r} s: must be where the last step ended, {time + 0.5!r} s"
+        )
+    for step in (0.501, 0.6, 2.0):
+        with pytest.raises(FMICallException):
+            instance.doStep(time + 0.5, step)
+        assert "must not lead past stopTime" in messages[-1]
+    instance.doStep(time + 0.5, 0.5)
+
+
+def test_a_host_may_add_up_its_time(instance: Any) -> None:
+    """10 000 steps of 0.1 s end 1.6e-10 s past the stop time."""
+    put(instance, step_size=0.1)
+    instance.setupExperiment(stopTime=1000.0)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    time = 0.0
+    for _ in range(10_000):
+        instance.doStep(time, 0.1)
+        time += 0.1
+    assert time > 1000.0
+    with pytest.raises(FMICallException):
+        instance.doStep(time, 0.1)
+
+
+def test_a_step_that_the_time_cannot_tell_is_refused(instance: Any, messages: list[str]) -> None:
+    start(instance, 1e15)
+    with pytest.raises(FMICallException):
+        instance.doStep(1e15, 0.1)
+    rule = "must not be less than what a double can tell at 1000000000000000.0 s, 0.125 s"
+    assert messages[-1] == f"communicationStepSize = 0.1 s: {rule}"
+    instance.doStep(1e15, 0.125)
+    instance.doStep(1e15 + 0.125, 1.0)
+    instance.reset()
+    start(instance, -1.0)
+    instance.doStep(-1.0, math.ulp(0.5))  # the last step of a host that has added up its time
 
 
 def test_tunable_parameters_change_between_steps(instance: Any) -> None:

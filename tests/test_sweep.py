@@ -29,7 +29,7 @@ from hovercraft_fmu import simulate
 from hovercraft_fmu.fmu.interface import STEP_UNSTABLE
 from hovercraft_fmu.model.dynamics import Controls
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator
-from hovercraft_fmu.model.subcycling import Settings, substeps
+from hovercraft_fmu.model.subcycling import Settings, meant_step, substeps
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Value
 from hovercraft_fmu.studies import carry_out, sweep_costs
@@ -112,7 +112,8 @@ def assert_what_is_kept_changes_no_bit(method: str, step_size: float, fmu: Path,
 def test_how_many_steps_are_left_out() -> None:
     def legs(scene: str, method: int, step_size: float, **keep: Any) -> int:
         study = read_study(but(scene=scene, keep=keep))
-        return len(merged(timeline(study.run, study.keep).legs, Settings(step_size, integrator(method))))
+        settings = Settings(step_size, integrator(method))
+        return len(merged(timeline(study.run, study.keep).legs, study.run.start_time, settings))
 
     jumps = 10
     assert legs("turn", 3, 0.1, end=["speed"]) == jumps
@@ -138,7 +139,7 @@ def test_merging_keeps_time_controls_sub_steps_and_what_is_kept(
         for i, (_, kept, thrust) in enumerate(parts)
     ]
     settings = Settings(step_size, integrator(method))
-    made = merged(legs, settings)
+    made = merged(legs, 0.0, settings)
     assert [leg.end for leg in made if leg.kept] == [leg.end for leg in legs if leg.kept]
     assert (made[0].time, made[-1].end) == (legs[0].time, legs[-1].end)
     assert all(a.end == b.time for a, b in itertools.pairwise(made))
@@ -146,8 +147,9 @@ def test_merging_keeps_time_controls_sub_steps_and_what_is_kept(
         inside = [each for each in legs if leg.time <= each.time and each.end <= leg.end]
         assert {each.controls for each in inside} == {leg.controls}
         if len(inside) > 1:
-            cuts = [substeps(each.end - each.time, step_size) for each in inside]
-            assert substeps(leg.end - leg.time, step_size) == (sum(n for n, _ in cuts), step_size)
+            steps = [meant_step(each.time, each.end - each.time, 0.0, step_size) for each in (*inside, leg)]
+            *cuts, whole = (substeps(step, step_size) for step in steps)
+            assert whole == (sum(n for n, _ in cuts), step_size)
             assert {h for _, h in cuts} == {step_size}
 
 

@@ -56,7 +56,7 @@ class AutopilotSlave(Slave):
     def _make_gains(self) -> Gains:
         return Gains(*(self._given[reference] for reference in GAIN_REFERENCES))
 
-    def _advance(self, step_size: float) -> None:
+    def _advance(self, _time: float, step_size: float) -> None:
         gains = self._make_gains() if self._tuned else self._gains
         self._sample(step_size, gains)
         self._gains, self._tuned = gains, False

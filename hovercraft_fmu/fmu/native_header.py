@@ -30,7 +30,7 @@ from .interface import (
     WARNINGS,
     WATCHED,
 )
-from .variable import SAME_TIME, Enumeration, Phase, Variable, may_be_set
+from .variable import Enumeration, Phase, Variable, may_be_set
 
 HEADER = """\
 /* Made from hovercraft_fmu/fmu/interface.py. */
@@ -65,7 +65,6 @@ enum {{ {warnings} }};
 #define COUNTER_STOPPED_TEXT {counter_text}
 {lists}
 #define HELD {held}
-#define SAME_TIME {same_time}
 
 enum kind {{ REAL, INTEGER, ENUMERATION }};
 enum phase {{ {phases}, PHASE_COUNT }};
@@ -212,7 +211,6 @@ def variables_header(block: Block) -> str:
         counter_text=_quoted(WARNINGS[COUNTER_STOPPED]),
         lists="\n".join(_list(each) for each in ENUMERATIONS),
         held=repr(HELD),
-        same_time=repr(SAME_TIME),
         phases=", ".join(name for name, _ in PHASES),
         rules=", ".join(RULES),
         phase_names=", ".join(_quoted(words) for _, words in PHASES),

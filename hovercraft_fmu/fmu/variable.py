@@ -10,9 +10,6 @@ from typing import Literal, TypeAlias
 Kind: TypeAlias = Literal["Real", "Integer", "Enumeration", "Boolean"]
 Causality: TypeAlias = Literal["input", "output", "local", "parameter", "calculatedParameter", "independent"]
 Variability: TypeAlias = Literal["continuous", "discrete", "fixed", "tunable"]
-SAME_TIME = 1e-9
-"""Relative to the time (at least 1 s): how far a communication point may lie from the end of the last step, or past
-the stop time."""
 
 
 @dataclass(frozen=True)

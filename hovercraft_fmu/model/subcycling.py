@@ -9,8 +9,8 @@ from .integrators import INTEGRATORS, Integrator, Stretch, adaptive
 
 MAX_SUBSTEPS = 10**9
 """Of one communication step: half an hour of computing, or a slip of the decimal point."""
-WHOLE = 1e-9
-"""Relative: a communication step this close to a whole number of sub-steps is that number of sub-steps."""
+UNIT = 2.0**-52
+"""Relative: one or two units in the last place of a double."""
 
 
 class Settings(NamedTuple):
@@ -54,12 +54,47 @@ def check_communication_step(communication_step: float) -> None:
         raise ValueError(f"communication step = {communication_step!r} s: must be a finite number, not negative")
 
 
+def rounding(largest: float, step: float, steps: float = 0.0) -> float:
+    """s: what two times that mean the same may differ by, or a step from the one that is meant. The one rule for that.
+
+    A host works a time out as start + n*step, as a whole number of nanoseconds, or as a sum. Start, product and sum
+    round by half a unit of the largest number at hand each, and a step that is the difference of two such times by
+    three units at most. A sum of n steps is off by n/2 units. And however large the time is, the steps are kept apart.
+
+    Args:
+        largest: s, the largest of the times at hand, the start among them, by size.
+        step: s, between them.
+        steps: how many steps the host may have added up.
+    """
+    return min((4.0 + steps) * UNIT * largest, 0.1 * step)
+
+
+def meant_step(time: float, step: float, start_time: float, step_size: float) -> float:
+    """s: the whole number of sub-steps that a communication step means, or else the communication step itself.
+
+    Hosts pass differences of times, 0.009999999999999787 for 0.01. What is meant does not depend on where the time
+    starts, nor do then the bits.
+
+    Args:
+        time: s, where the step begins.
+        step: s, as the host has it, greater than 0.
+        start_time: s, of the whole run.
+        step_size: s, the sub-step.
+    """
+    ratio = step / step_size
+    if not ratio <= MAX_SUBSTEPS + 1:
+        return step
+    whole = (round(ratio) or 1) * step_size
+    largest = max(abs(time), abs(time + step), abs(start_time))
+    return whole if abs(whole - step) <= rounding(largest, step) else step
+
+
 def substeps(communication_step: float, step_size: float) -> tuple[int, float]:
     """Number and size [s] of the sub-steps that make up a communication step [s].
 
-    Hosts add up time in floating point and pass 0.009999999999999787 for 0.01. Where the communication step is that
-    close to a whole number of sub-steps, the sub-step is `step_size` itself, and the bits do not depend on how the
-    host cuts the time. Elsewhere n equal sub-steps, none longer than `step_size`, end exactly on time.
+    Where it is a whole number of sub-steps, but for the rounding of its own, the sub-step is `step_size` itself, and
+    the bits do not depend on how the time is cut. Elsewhere n equal sub-steps, none longer than `step_size`, end
+    exactly on time.
 
     Raises:
         ValueError: a step that is negative or not finite, or would need more than 10^9 sub-steps.
@@ -70,7 +105,7 @@ def substeps(communication_step: float, step_size: float) -> tuple[int, float]:
     if ratio > MAX_SUBSTEPS + 1:
         raise too_many_substeps(communication_step, step_size)
     whole = round(ratio) or 1
-    if abs(whole * step_size - communication_step) <= WHOLE * communication_step:
+    if abs(whole * step_size - communication_step) <= rounding(communication_step, communication_step):
         n, h = whole, step_size
     else:
         n = math.ceil(ratio) or 1

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..fmu.interface import ACTION, INPUTS, MOTION, STATES, SUBSTEPS_MAX, WATCHED
 from ..model.observation import observe_action, observe_motion
-from ..model.subcycling import advance
+from ..model.subcycling import advance, meant_step
 from .planning import Run
 from .points import controls_at, schedule
 from .result import Result
@@ -26,7 +26,8 @@ def run_model(run: Run) -> Result:
 
     rows = [row(run.start_time)]
     for time, end, controls in schedule(run):
-        stretch = advance(state, controls, craft, end - time, settings, proposed=proposed)
+        step = meant_step(time, end - time, run.start_time, settings.step_size)
+        stretch = advance(state, controls, craft, step, settings, proposed=proposed)
         state, proposed = stretch.state, stretch.proposed
         stability = max(stability, stretch.stability)
         rotation = max(rotation, stretch.rotation)

@@ -12,7 +12,7 @@ import polars as pl
 from ..fmu.start_values import Value
 from ..model.craft import DIRECTIONAL
 from ..model.dynamics import State
-from ..model.subcycling import advance
+from ..model.subcycling import advance, meant_step
 from ..scenes import SCENES, Scene
 from ..simulation import plan, schedule
 from ..view.palette import INK, SHADES
@@ -78,7 +78,8 @@ TERMS = (
 def walk(scene: Scene, settings: Mapping[str, Value]) -> Ready[list[State]]:
     """The whole scene on the bare model: the states at its own communication points."""
     run = plan(scene, start_values=settings)
-    steps = [(end - time, controls) for time, end, controls in schedule(run)]
+    size = run.settings.step_size
+    steps = [(meant_step(time, end - time, run.start_time, size), controls) for time, end, controls in schedule(run)]
 
     def go() -> list[State]:
         states = [run.start]

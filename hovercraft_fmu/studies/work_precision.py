@@ -11,7 +11,7 @@ import polars as pl
 from ..fmu.interface import INPUTS, OUTPUTS, STATES
 from ..host import Instance
 from ..model.dynamics import Controls, State, windy
-from ..model.subcycling import advance
+from ..model.subcycling import advance, meant_step
 from ..scenes import SCENES, Scene
 from ..simulation import Run, method_in_words, plan, schedule
 from ..view.palette import METHODS
@@ -95,10 +95,11 @@ def bare(run: Run, points: Points) -> Ready[Reached]:
     It has no communication points: it goes on for as long as the controls hold, but for rounding.
     """
     stretches = []
+    craft, chosen = run.craft, run.settings
     for _, group in itertools.groupby(points, key=lambda point: tuple(round(value, 9) for value in point[2])):
         held = list(group)
-        stretches.append((held[-1][1] - held[0][0], held[0][2]))
-    craft, chosen = run.craft, run.settings
+        step = meant_step(held[0][0], held[-1][1] - held[0][0], run.start_time, chosen.step_size)
+        stretches.append((step, held[0][2]))
 
     def go() -> Reached:
         state, proposed, count = run.start, 0.0, 0

@@ -23,7 +23,7 @@ from ..fmu.interface import (
 )
 from ..host.fleet import Array, Crafts, advance_fleet, observe_fleet, refusals
 from ..model.dynamics import Controls, State
-from ..model.subcycling import NonFiniteError, Settings
+from ..model.subcycling import NonFiniteError, Settings, meant_step
 from .engines import SETTINGS, Plan, Ran, empty, settings_of
 from .study import Samples
 from .timeline import Leg, merged
@@ -68,9 +68,9 @@ def _possible(plan: Plan, samples: Samples, group: NDArray[np.int64], ran: Ran) 
 
 
 @lru_cache(maxsize=16)
-def _merged(legs: tuple[Leg, ...], settings: Settings) -> list[Leg]:
+def _merged(legs: tuple[Leg, ...], start_time: float, settings: Settings) -> list[Leg]:
     """The same for every chunk."""
-    return merged(legs, settings)
+    return merged(legs, start_time, settings)
 
 
 class _Batch:
@@ -93,7 +93,7 @@ class _Batch:
         if timeline.start_kept:
             self._keep(point, self._controls(timeline.start))
             point += 1
-        for leg in _merged(timeline.legs, self._settings):
+        for leg in _merged(timeline.legs, self._plan.run.start_time, self._settings):
             controls = self._controls(leg.controls)
             self._advance(leg, controls)
             if leg.kept:
@@ -106,9 +106,8 @@ class _Batch:
         return Controls(*given)
 
     def _advance(self, leg: Leg, controls: Controls) -> None:
-        fleet = advance_fleet(
-            self._states, controls, self._crafts, leg.end - leg.time, self._settings, proposed=self._proposed
-        )
+        step = meant_step(leg.time, leg.end - leg.time, self._plan.run.start_time, self._settings.step_size)
+        fleet = advance_fleet(self._states, controls, self._crafts, step, self._settings, proposed=self._proposed)
         self._states, self._proposed = fleet.states, fleet.proposed
         for i, why in fleet.refused.items():
             self._errors.setdefault(i, _said(why, leg.time))

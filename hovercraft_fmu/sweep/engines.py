@@ -71,7 +71,7 @@ class Driver:
         path.write_bytes(fmu)
         self._craft = self._stack.enter_context(self._stack.enter_context(Fmu(path)).instance())
         self._busy, self._over = threading.Lock(), False
-        self._merged = lru_cache(maxsize=16)(partial(merged, plan.timeline.legs))
+        self._merged = lru_cache(maxsize=16)(partial(merged, plan.timeline.legs, plan.run.start_time))
         names = tuple(dict.fromkeys((*plan.run.start_values, *swept)))
         self._shared = {name: plan.run.value(name) for name in (*names, *SETTINGS)}
         self._start_values, self._inputs = self._craft.port(*names), self._craft.port(*INPUTS)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.dynamics import Controls
-from ..model.subcycling import Settings, substeps
+from ..model.subcycling import Settings, meant_step, substeps
 from ..simulation import Run, controls_at, schedule
 from .quantities import Keep
 
@@ -54,7 +54,7 @@ def timeline(run: Run, keep: Keep) -> Timeline:
     return Timeline(controls, start_kept, tuple(legs), np.array(times), np.array(sampled))
 
 
-def merged(legs: Iterable[Leg], settings: Settings) -> list[Leg]:
+def merged(legs: Iterable[Leg], start_time: float, settings: Settings) -> list[Leg]:
     """Legs with the same controls as one, where nothing is kept in between and no bit of the end changes.
 
     That is where each of them, and the whole, is a whole number of sub-steps: then all are `step_size` long, however
@@ -65,17 +65,25 @@ def merged(legs: Iterable[Leg], settings: Settings) -> list[Leg]:
     whole: list[Leg] = []
     for leg in legs:
         last = whole[-1] if whole else None
-        if last and not last.kept and last.controls == leg.controls and _as_one(last, leg, settings.step_size):
+        if (
+            last
+            and not last.kept
+            and last.controls == leg.controls
+            and _as_one(last, leg, start_time, settings.step_size)
+        ):
             whole[-1] = last._replace(end=leg.end, kept=leg.kept)
         else:
             whole.append(leg)
     return whole
 
 
-def _as_one(first: Leg, second: Leg, step_size: float) -> bool:
+def _as_one(first: Leg, second: Leg, start_time: float, step_size: float) -> bool:
+    def cut(time: float, end: float) -> tuple[int, float]:
+        return substeps(meant_step(time, end - time, start_time, step_size), step_size)
+
     try:
-        parts = [substeps(each.end - each.time, step_size) for each in (first, second)]
-        n, h = substeps(second.end - first.time, step_size)
+        parts = [cut(*each[:2]) for each in (first, second)]
+        n, h = cut(first.time, second.end)
     except ValueError:  # an impossible step: who makes it says so
         return False
     return n == sum(part for part, _ in parts) and h == parts[0][1] == parts[1][1] == step_size

@@ -31,11 +31,14 @@ enum verdict instance_update_discrete_states(struct instance *instance)
 enum verdict instance_complete_integrator_step(struct instance *instance, bool *event_needed)
 {
     const double time = instance->now.time, stop_time = instance->now.stop_time;
-    if (time - stop_time > SAME_TIME * larger(1.0, fabs(stop_time)))
+    const double start_time = instance->now.start_time, step = time - instance->now.completed;
+    const double largest = larger(fabs(time), fabs(start_time));
+    if (step > 0.0 && time - stop_time > kernel_rounding(largest, step, (time - start_time) / step))
         return instance_say(instance, REFUSED, "%s at %r s: must not lead past stopTime = %r s",
                             call_name(instance, COMPLETE_INTEGRATOR_STEP), time, stop_time);
     if (instance_take_up(instance) == REFUSED)
         return REFUSED;
+    instance->now.completed = time;
     *event_needed = instance_has_to_warn(instance);
     return FINE;
 }
@@ -47,7 +50,7 @@ enum verdict instance_set_time(struct instance *instance, double time)
     const double start_time = instance->now.start_time;
     if (!isfinite(time))
         return instance_say(instance, REFUSED, "time = %r s: must be a finite number", time);
-    if (start_time - time > SAME_TIME * larger(1.0, fabs(start_time)))
+    if (start_time - time > kernel_rounding(fabs(start_time), INFINITY, 0.0))
         return instance_say(instance, REFUSED, "time = %r s: must not be before startTime = %r s", time, start_time);
     instance->now.time = time;
     return FINE;

@@ -59,7 +59,7 @@ enum verdict instance_set_up(struct instance *instance, double start_time, bool 
     if (!(stop_time >= start_time))
         return instance_say(instance, REFUSED, "stopTime = %r s: must not be before startTime = %r s", stop_time,
                             start_time);
-    instance->now.time = instance->now.start_time = start_time;
+    instance->now.time = instance->now.completed = instance->now.start_time = start_time;
     instance->now.stop_time = stop_time;
     instance->now.hosts_tolerance = tolerance_given ? tolerance : 0.0;
     return FINE;

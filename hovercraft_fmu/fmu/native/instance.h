@@ -41,6 +41,7 @@ struct content {
     enum use use;                     /* as it was started; a reset keeps it */
     enum phase phase;
     double time;                      /* s, where the last step ended; in model exchange as the solver sets it */
+    double completed;                 /* s, in model exchange: where the last completed step ended */
     double start_time;                /* s, given with the experiment */
     double stop_time;                 /* s, given with the experiment; else infinite */
     double reals[VARIABLE_COUNT];     /* what is read, by value reference */

@@ -17,7 +17,7 @@ static const double MIN_STEP = 1e-12;     /* s: below it the adaptive method giv
 static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
 static const double NEAR_REST = 4.0;      /* sub-steps in which friction could stop the craft */
 static const double LEAST_SLIP = 1e-150;  /* m/s: so that at rest nothing is divided by zero */
-static const double WHOLE = 1e-9;         /* relative: this close to a whole number of sub-steps is that number */
+static const double UNIT = 0x1p-52;       /* relative: one or two units in the last place of a double */
 static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds what is smaller, ties to even */
 
 /* With HOVERCRAFT_LIBM the platform's functions, which Python uses, too. */
@@ -761,14 +761,36 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
 
 /* ---- subcycling.py */
 
+double kernel_rounding(double largest, double step, double steps)
+{
+    return smaller((4.0 + steps) * UNIT * largest, 0.1 * step);
+}
+
+/* To the nearest, of what is below 2^51. */
+static double whole_number(double ratio)
+{
+    return larger(1.0, ratio + TO_INTEGER - TO_INTEGER);
+}
+
+double kernel_meant_step(double time, double step, double start_time, double step_size)
+{
+    const double ratio = step / step_size;
+    if (!(ratio <= MAX_SUBSTEPS + 1.0))
+        return step;
+    const double whole = whole_number(ratio) * step_size;
+    const double largest = larger(larger(fabs(time), fabs(time + step)), fabs(start_time));
+    return fabs(whole - step) <= kernel_rounding(largest, step, 0.0) ? whole : step;
+}
+
 /* Number and size [s] of the sub-steps of a communication step; false where they are too many. */
 static bool substeps(double communication_step, double step_size, int64_t *n, double *h)
 {
     const double ratio = communication_step / step_size;
     if (!(ratio <= MAX_SUBSTEPS + 1.0))
         return false;
-    double whole = larger(1.0, ratio + TO_INTEGER - TO_INTEGER);
-    if (fabs(whole * step_size - communication_step) <= WHOLE * communication_step) {
+    double whole = whole_number(ratio);
+    const double rounding = kernel_rounding(communication_step, communication_step, 0.0);
+    if (fabs(whole * step_size - communication_step) <= rounding) {
         *h = step_size;
     } else {
         const double down = (double)(int64_t)ratio;

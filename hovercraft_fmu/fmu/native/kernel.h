@@ -109,6 +109,11 @@ HIDDEN struct loads kernel_loads_on(const struct state *state, const struct cont
 /* Surge and sway [m/s]. */
 HIDDEN void kernel_body_velocity(const struct state *state, double *surge, double *sway);
 
+/* s: what two times that mean the same may differ by; see subcycling.py. */
+HIDDEN double kernel_rounding(double largest, double step, double steps);
+/* s: the whole number of sub-steps that a communication step means, or else the communication step itself. */
+HIDDEN double kernel_meant_step(double time, double step, double start_time, double step_size);
+
 /* The state one communication step [s], greater than 0, later. `proposed` [s] is what the last stretch of the adaptive
    method returned, 0 at the start. */
 HIDDEN enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,

@@ -12,7 +12,7 @@
 #include "instance.h"
 #include "variant.h"
 
-enum { VERSION = 5, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
+enum { VERSION = 6, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
 static const char MAGIC[] = "HOVERFMU";
 
 enum direction { MEASURE, WRITE, READ };
@@ -100,6 +100,7 @@ static void exchange(struct cursor *cursor, struct content *c)
     exchange_double(cursor, &c->settings.step_size);
     exchange_double(cursor, &c->settings.tolerance);
     exchange_double(cursor, &c->time);
+    exchange_double(cursor, &c->completed);
     exchange_double(cursor, &c->start_time);
     exchange_double(cursor, &c->stop_time);
     for (unsigned i = 0; i < VARIABLE_COUNT; i++)

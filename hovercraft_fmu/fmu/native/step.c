@@ -3,16 +3,36 @@
 #include <math.h>
 #include <string.h>
 
+/* s: from a time to the next double that is larger in size. */
+static double spacing_at(double time)
+{
+    const double size = fabs(time);
+    double next;
+    uint64_t bits;
+    memcpy(&bits, &size, sizeof bits);
+    bits++;
+    memcpy(&next, &bits, sizeof next);
+    return next - size;
+}
+
 static enum verdict check_step(struct instance *instance, double point, double step)
 {
     const double time = instance->now.time, stop_time = instance->now.stop_time;
+    const double start_time = instance->now.start_time, end = point + step;
+    const double largest = larger(larger(fabs(time), fabs(end)), fabs(start_time));
     if (!(0.0 < step && step < INFINITY))
         return instance_say(instance, REFUSED,
                             "communicationStepSize = %r s: must be a finite number greater than 0", step);
-    if (point != time && !(fabs(point - time) <= SAME_TIME * larger(1.0, fabs(time))))
+    const double rounding = kernel_rounding(largest, step, (time - start_time) / step);
+    if (!(fabs(point - time) <= rounding))
         return instance_say(instance, REFUSED,
                             "currentCommunicationPoint = %r s: must be where the last step ended, %r s", point, time);
-    if (point + step - stop_time > SAME_TIME * larger(1.0, fabs(stop_time)))
+    const double spacing = spacing_at(fabs(end) < fabs(point) ? end : point);
+    if (step < spacing)
+        return instance_say(instance, REFUSED,
+                            "communicationStepSize = %r s: must not be less than what a double can tell at %r s, %r s",
+                            step, point, spacing);
+    if (end - stop_time > rounding)
         return instance_say(instance, REFUSED,
                             "communicationStepSize = %r s from %r s: must not lead past stopTime = %r s", step, point,
                             stop_time);
@@ -181,8 +201,10 @@ static enum verdict take_step(struct instance *instance, double point, double st
     struct controls end;
     struct craft craft = now->craft;
     struct stretch stretch = {.substeps = 0};
+    const double end_time = point + step;
     if (check_step(instance, point, step) == REFUSED)
         return REFUSED;
+    step = kernel_meant_step(point, step, now->start_time, now->settings.step_size);
     if (now->tuned && instance_make_craft(instance, &craft) == REFUSED)
         return REFUSED;
     if (make_drive(instance, step, &drive, &end) == REFUSED)
@@ -198,7 +220,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->controls = end;
     now->craft = craft;
     now->tuned = false;
-    now->time = point + step;
+    now->time = end_time;
     now->motion_unread = now->action_unread = true;
     now->stability = larger(now->stability, stretch.stability);
     now->rotation = larger(now->rotation, stretch.rotation);

@@ -6,8 +6,8 @@ import math
 from collections.abc import MutableMapping
 from typing import Any, ClassVar, TypeVar
 
-from ...model.subcycling import check_tolerance
-from ..variable import SAME_TIME, Model, Phase, Variable, may_be_set
+from ...model.subcycling import check_tolerance, rounding
+from ..variable import Model, Phase, Variable, may_be_set
 from .wrapper import WrappedSlave, called_by_wrapper
 
 DIGEST_SIZE = 64
@@ -46,6 +46,7 @@ class Slave(WrappedSlave):
             elif variable.start is not None:
                 self._given[variable.reference] = float(variable.start)
         self._time = 0.0
+        self._start_time = 0.0
         self._stop_time = math.inf  # with the experiment; the standard forbids to step past it
         self._hosts_tolerance: float | None = None  # with the experiment; it comes before a parameter of that name
         self._tuned = False  # a parameter was set since the last step: the next one takes it up
@@ -64,7 +65,8 @@ class Slave(WrappedSlave):
         stop_time = math.inf if stop_time is None else stop_time
         if not stop_time >= start_time:
             raise ValueError(f"stopTime = {stop_time!r} s: must not be before startTime = {start_time!r} s")
-        self._time, self._stop_time, self._hosts_tolerance = start_time, stop_time, tolerance
+        self._time = self._start_time = start_time
+        self._stop_time, self._hosts_tolerance = stop_time, tolerance
 
     @called_by_wrapper
     def enter_initialization_mode(self) -> None:
@@ -81,26 +83,32 @@ class Slave(WrappedSlave):
         try:
             if self._phase is not Phase.STEPPING:
                 self._require("fmi2DoStep", Phase.STEPPING)
-            if not 0.0 < step_size < math.inf:
-                raise ValueError(f"communicationStepSize = {step_size!r} s: must be a finite number greater than 0")
-            time = self._time
-            if current_time != time and not abs(current_time - time) <= SAME_TIME * max(1.0, abs(time)):
-                raise ValueError(
-                    f"currentCommunicationPoint = {current_time!r} s: must be where the last step ended, {time!r} s"
-                )
-            stop_time = self._stop_time
-            if current_time + step_size - stop_time > SAME_TIME * max(1.0, abs(stop_time)):
-                raise ValueError(
-                    f"communicationStepSize = {step_size!r} s from {current_time!r} s: must not lead past "
-                    f"stopTime = {stop_time!r} s"
-                )
-            self._advance(step_size)
+            self._check_step(current_time, step_size)
+            self._advance(current_time, step_size)
             self._time = current_time + step_size
             self._stale = True
             return True
         except Exception:
             self.outlive_exception()
             raise
+
+    def _check_step(self, point: float, step: float) -> None:
+        time, start_time, stop_time, end = self._time, self._start_time, self._stop_time, point + step
+        if not 0.0 < step < math.inf:
+            raise ValueError(f"communicationStepSize = {step!r} s: must be a finite number greater than 0")
+        same = rounding(max(abs(time), abs(end), abs(start_time)), step, (time - start_time) / step)
+        if not abs(point - time) <= same:
+            raise ValueError(f"currentCommunicationPoint = {point!r} s: must be where the last step ended, {time!r} s")
+        spacing = math.ulp(min(abs(point), abs(end)))
+        if step < spacing:
+            raise ValueError(
+                f"communicationStepSize = {step!r} s: must not be less than what a double can tell at {point!r} s, "
+                f"{spacing!r} s"
+            )
+        if end - stop_time > same:
+            raise ValueError(
+                f"communicationStepSize = {step!r} s from {point!r} s: must not lead past stopTime = {stop_time!r} s"
+            )
 
     @called_by_wrapper
     def terminate(self) -> None:
@@ -216,6 +224,7 @@ class Slave(WrappedSlave):
             "build": self.build,
             "phase": self._phase.name,
             "time": self._time,
+            "start_time": self._start_time,
             "stop_time": self._stop_time,
             "tolerance": self._hosts_tolerance,
             "reals": [self._given[reference] for reference in self._kept],
@@ -229,7 +238,8 @@ class Slave(WrappedSlave):
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self._check_build(state)
         self._phase = Phase[state["phase"]]
-        self._time, self._stop_time, self._hosts_tolerance = state["time"], state["stop_time"], state["tolerance"]
+        self._time, self._start_time, self._stop_time = state["time"], state["start_time"], state["stop_time"]
+        self._hosts_tolerance = state["tolerance"]
         self._given.update(zip(self._kept, state["reals"], strict=True))
         self._integers.update(zip(sorted(self._integers), state["integers"], strict=True))
         self._booleans.update(zip(sorted(self._booleans), state["booleans"], strict=True))
@@ -270,8 +280,8 @@ class Slave(WrappedSlave):
         """Make the state from the start values. Raises ValueError where they are impossible together."""
         raise NotImplementedError
 
-    def _advance(self, step_size: float) -> None:
-        """Go on by a communication step [s], or raise and change nothing."""
+    def _advance(self, time: float, step_size: float) -> None:
+        """Go on from a time by a communication step [s], or raise and change nothing."""
         raise NotImplementedError
 
     def _observe(self) -> dict[int, float]:

@@ -13,6 +13,7 @@ from ...model.subcycling import (
     advance,
     check_step_size,
     check_tolerance,
+    meant_step,
 )
 from ..interface import (
     ACTION,
@@ -66,9 +67,10 @@ class HovercraftSlave(Slave):
 
     # ---- a step
 
-    def _advance(self, step_size: float) -> None:
+    def _advance(self, time: float, step_size: float) -> None:
         controls = self._make_controls()
         craft = self._make_craft() if self._tuned else self._craft
+        step_size = meant_step(time, step_size, self._start_time, self._settings.step_size)
         try:
             stretch = advance(self._state, controls, craft, step_size, self._settings, proposed=self._proposed)
         except NonFiniteError as error:
