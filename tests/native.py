@@ -3,7 +3,18 @@
 import itertools
 import subprocess
 from collections.abc import Iterable, Sequence
-from ctypes import CDLL, Structure, byref, c_bool, c_char_p, c_double, c_int32, c_int64, create_string_buffer
+from ctypes import (
+    CDLL,
+    Structure,
+    byref,
+    c_bool,
+    c_char_p,
+    c_double,
+    c_int32,
+    c_int64,
+    c_void_p,
+    create_string_buffer,
+)
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
@@ -69,7 +80,7 @@ class CControls(Structure):
 
 
 class CDrive(Structure):
-    _fields_ = [("start", CControls), ("rate", CControls), ("ramped", c_bool)]
+    _fields_ = [("start", CControls), ("rate", CControls), ("varies", c_bool), ("ask", c_void_p), ("asked", c_void_p)]
 
 
 class CSettings(Structure):

@@ -364,8 +364,8 @@ INSTANTIATE = "fmi3InstantiateCoSimulation"
         (None, {"eventModeUsed": True}, f"{INSTANTIATE}: eventModeUsed must be false: hasEventMode is false"),
         (
             None,
-            {"requiredIntermediateVariables": [0]},
-            f"{INSTANTIATE}: requiredIntermediateVariables must be empty: providesIntermediateUpdate is false",
+            {"requiredIntermediateVariables": [0, reference("speed")]},
+            f"{INSTANTIATE}: requiredIntermediateVariables must be inputs: no other has intermediateUpdate",
         ),
     ],
 )
@@ -444,7 +444,7 @@ def test_what_is_logged(slave: fmi3.FMU3Slave) -> None:
 
 
 def test_the_flags_say_what_there_is(native3_fmu: Path) -> None:
-    """No intermediate update, no early return, no event mode, no clocks: nothing here could check them."""
+    """No early return, no event mode, no clocks: nothing here could check them."""
     both = {
         "modelIdentifier": NATIVE3.identifier,
         "needsExecutionTool": "false",
@@ -459,7 +459,7 @@ def test_the_flags_say_what_there_is(native3_fmu: Path) -> None:
     steps = {
         "canHandleVariableCommunicationStepSize": "true",
         "maxOutputDerivativeOrder": "1",
-        "providesIntermediateUpdate": "false",
+        "providesIntermediateUpdate": "true",
         "mightReturnEarlyFromDoStep": "false",
         "canReturnEarlyAfterIntermediateUpdate": "false",
         "hasEventMode": "false",

@@ -16,7 +16,7 @@ from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL
 from hovercraft_fmu.autopilot.pilot_package import AUTOPILOT
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour, model_description, xml
 from hovercraft_fmu.fmu.extras import RESULT, terminals
-from hovercraft_fmu.fmu.interface import BY_NAME, HOVERCRAFT, STATES
+from hovercraft_fmu.fmu.interface import BY_NAME, HOVERCRAFT, INPUTS, STATES
 from hovercraft_fmu.studies.pages import default_result
 from tests.lowlevel import one
 
@@ -102,6 +102,12 @@ def test_what_must_be_greater_than_0_has_no_bound_of_0(description: Any) -> None
         text = node.get("description") or node.getparent().get("description")
         if "greater than 0" in text:
             assert node.get("min") is None
+
+
+def test_inputs_alone_are_set_inside_a_step(description: Any, kind: Flavour) -> None:
+    """[3.0: 2.4.7.4, 4.4] parameters must not be; the attribute is there where the FMU asks for them."""
+    inside = {node.get("name") for node in variables(description) if node.get("intermediateUpdate")}
+    assert inside == (set(INPUTS) if kind.fmi == 3 else set())
 
 
 def test_the_hosts_memory_management_is_not_asked(description: Any, kind: Flavour) -> None:

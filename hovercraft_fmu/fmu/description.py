@@ -42,7 +42,7 @@ CAPABILITIES_3 = {
     "providesPerElementDependencies": "false",
     "providesEvaluateDiscreteStates": "false",
 }
-"""Of FMI 3.0, whatever the interface. Intermediate update, early return and clocks: nothing that could check them."""
+"""Of FMI 3.0, whatever the interface. Early return and clocks: nothing that could check them."""
 PARTS = (
     "exchange.c",
     "instance.c",
@@ -156,7 +156,7 @@ NATIVE3 = Flavour(
         {
             "canHandleVariableCommunicationStepSize": "true",
             "maxOutputDerivativeOrder": "1",
-            "providesIntermediateUpdate": "false",
+            "providesIntermediateUpdate": "true",
             "mightReturnEarlyFromDoStep": "false",
             "canReturnEarlyAfterIntermediateUpdate": "false",
             "hasEventMode": "false",
@@ -269,6 +269,8 @@ def _variable(parent: Element, variable: Variable, flavour: Flavour) -> None:
     }
     if variable.initial:
         attributes["initial"] = variable.initial
+    if variable.causality == "input" and flavour.capabilities.get("providesIntermediateUpdate") == "true":
+        attributes["intermediateUpdate"] = "true"
     node = _typed(parent, "ScalarVariable", variable.kind, attributes, flavour.fmi)
     if variable.enumeration:
         node.set("declaredType", variable.enumeration.type_name)

@@ -158,8 +158,10 @@ PHASES = (
     *((phase.name, phase.value) for phase in Phase),
     ("EVENT_MODE", "event mode"),
     ("CONTINUOUS_TIME", "continuous-time mode"),
+    ("INTERMEDIATE_UPDATE", "intermediate update mode"),
 )
-"""Name, the words of the standard; the last two are model exchange's."""
+"""Name, the words of the standard; those that are not in every FMU are the last: two of model exchange, and one of
+FMI 3.0, inside a step."""
 OF_A_KIND = {
     "drag_center_fraction": "FRACTION",
     "rotational_drag": "SHARE",
@@ -274,7 +276,8 @@ def _assertion(condition: str, what: str) -> str:
 
 def _row(variable: Variable) -> str:
     settable = [may_be_set(variable, phase) for phase in Phase]
-    settable += [may_be_set(variable, Phase.STEPPING), variable.causality == "input"]
+    is_input = variable.causality == "input"
+    settable += [may_be_set(variable, Phase.STEPPING), is_input, is_input]
     phases = sum(1 << i for i, each in enumerate(settable) if each)
     role = _quoted(f"{variable.variability} {variable.causality}")
     given = "true" if variable.start is not None else "false"

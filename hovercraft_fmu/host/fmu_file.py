@@ -10,7 +10,7 @@ from typing import Any
 import fmpy
 
 from ..fmu.interface import HOVERCRAFT
-from .instance import Instance
+from .instance import Instance, Intermediate
 
 VERSIONS = ("2.0", "3.0")
 """Of FMI, that are driven here."""
@@ -47,13 +47,14 @@ class Fmu:
             self.close()
             raise
 
-    def instance(self, exchange: bool = False) -> Instance:
-        """A new instance, for co-simulation or for model exchange.
+    def instance(self, exchange: bool = False, intermediate: Intermediate | None = None) -> Instance:
+        """A new instance, for co-simulation, with inputs inside its steps or without, or for model exchange.
 
         Raises:
             SimulationError: it is not an FMU for that, or it cannot be loaded or instantiated.
+            ValueError: it takes no such inputs inside a step.
         """
-        return Instance(self.description, self.folder, exchange)
+        return Instance(self.description, self.folder, exchange, intermediate)
 
     def close(self) -> None:
         """Delete what was extracted; its instances must be closed."""

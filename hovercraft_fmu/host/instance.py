@@ -35,6 +35,17 @@ class Events(NamedTuple):
     """s, of the next event, where it is timed"""
 
 
+class Intermediate(NamedTuple):
+    """Inputs that change inside a step: an FMU of FMI 3.0 asks for them wherever it works out its loads.
+
+    A solver that tries steps again may ask for a time that is earlier than the last one.
+    """
+
+    names: Sequence[str]
+    values: Callable[[float], Sequence[float]]
+    """Time [s] -> a value for each of the names. What it raises the step raises, when it is done."""
+
+
 class Instance:
     """An instance of an FMU: start values by name, initialization, steps, groups of variables, states.
 
@@ -63,12 +74,16 @@ class Instance:
         solved.set_time(0.1)
         solved.set_states(x, len(x)); solved.get_derivatives(x, len(x))   # arrays, or a solver's pointers
 
+    An FMU of FMI 3.0 takes inputs inside a step, too:
+
+        fmu.instance(intermediate=Intermediate(["thrust"], lambda t: [5.0 + 4.0 * sin(t)]))
+
     Raises, all methods:
         SimulationError: the FMU refused the call, with its message. After an error `reset` leads back, after a fatal
             one, too: then the instance is made anew.
     """
 
-    def __init__(self, description: Any, folder: str, exchange: bool) -> None:
+    def __init__(self, description: Any, folder: str, exchange: bool, intermediate: Intermediate | None = None) -> None:
         use = description.modelExchange if exchange else description.coSimulation
         if use is None:
             wanted = "model exchange" if exchange else "co-simulation"
@@ -81,6 +96,12 @@ class Instance:
         self.messages = self._log.messages
         """What the FMU has said, warnings and refusals; whoever reads it may clear it."""
         self._fatal = False
+        self._intermediate = intermediate
+        self._raised: BaseException | None = None  # inside a step
+        if intermediate and (exchange or not getattr(use, "providesIntermediateUpdate", False)):
+            raise ValueError(
+                f"{description.modelName}: must be an FMU of FMI 3.0 for co-simulation that takes inputs inside a step"
+            )
         kinds = (fmi3.FMU3Slave, fmi3.FMU3Model) if self.is_fmi_3 else (fmi2.FMU2Slave, fmi2.FMU2Model)
         arguments = {"guid": description.guid, "unzipDirectory": folder, "modelIdentifier": use.modelIdentifier}
         self.component: Any = None
@@ -94,17 +115,34 @@ class Instance:
         self._instantiate()
         self._prepare(exchange)
 
+    def _update(self, _environment: object, time: float, *_others: object) -> None:
+        """Called by the FMU; ctypes would drop what is raised."""
+        assert self._intermediate
+        try:
+            self._asked.set(self._intermediate.values(time))
+        except BaseException as error:  # whatever it is: the step raises it
+            self._raised = self._raised or error
+
+    def _inside(self) -> dict[str, Any]:
+        """What fmpy is to be told of inputs inside a step."""
+        if self._intermediate is None:
+            return {}
+        references = [self._variable(name).valueReference for name in self._intermediate.names]
+        return {"intermediateUpdate": self._update, "requiredIntermediateVariables": references}
+
     def _instantiate(self) -> None:
         """With its logging on: without it pythonfmu's wrapper keeps its messages, even of errors, to itself."""
         self.component = None
         try:
             if self.is_fmi_3:
-                self.fmpy.instantiate(logMessage=self._log.callback_3(), loggingOn=True)
+                self.fmpy.instantiate(logMessage=self._log.callback_3(), loggingOn=True, **self._inside())
             else:
                 self.fmpy.instantiate(callbacks=CALLBACKS_2, loggingOn=True)
         except Exception as error:  # and here
             raise SimulationError(self._log.refusal() or f"{self.description.modelName}: {error}") from error
         self.component = self.fmpy.component
+        if self._intermediate:
+            self._asked = self.port(*self._intermediate.names)
 
     def _prepare(self, exchange: bool) -> None:
         """What is called again and again.
@@ -219,6 +257,9 @@ class Instance:
         """From a communication point [s], for a duration [s]."""
         if self.is_fmi_3:
             status = self._do_step(self.component, time, duration, True, *self._ends)
+            if self._raised:
+                raised, self._raised = self._raised, None
+                raise raised
             if status <= WARNING and self._ending.value:
                 raise SimulationError(f"the FMU asks to end at {self._time.value!r} s")
         else:

@@ -115,6 +115,41 @@ static void read(void *craft)
     }
 }
 
+#if FMI == 3
+
+static void *asking;
+
+/* Sets the thrust, in the host's environment, into which it was called. */
+static void answer(fmi3InstanceEnvironment craft, double time, bool set, bool get, bool finished, bool early,
+                   bool *return_early, double *when)
+{
+    static const unsigned thrust = V_THRUST;
+    (void)craft, (void)set, (void)get, (void)finished, (void)early, (void)return_early, (void)when;
+    demand(environment() == host, "inputs are asked for in the host's environment");
+    set_environment(DEFAULT);
+    const double value = 5.0 + time;
+    IN_HOST(call_set(asking, &thrust, 1, &value));
+    add(&time, sizeof time);
+    set_environment(host);
+}
+
+static void *instantiate(enum call_use use)
+{
+    if (use == CALL_STEPS)
+        return asking = fmi3InstantiateCoSimulation("craft", VARIANT.guid, "", false, true, false, false, NULL, 0, NULL,
+                                                    call_log, answer);
+    return call_instantiate(use, VARIANT.guid, "");
+}
+
+#else
+
+static void *instantiate(enum call_use use)
+{
+    return call_instantiate(use, VARIANT.guid, "");
+}
+
+#endif
+
 /* What is refused, each with its message. */
 static void refuse(void *craft)
 {
@@ -205,7 +240,7 @@ static void run_away(int method, enum call_use use)
 
 static void run(int method, enum call_use use, int term)
 {
-    void *craft = call_instantiate(use, VARIANT.guid, "");
+    void *craft = instantiate(use);
     demand(craft != NULL, "instantiate");
     IN_HOST(call_choose(craft, V_INTEGRATOR, method));
     set_terms(craft, term);

@@ -91,7 +91,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     c->callbacks = functions ? *functions : none;
     memcpy(c->name, name ? name : "", length);
     c->name[length] = '\0';
-    const struct services services = {2, tell, allocate, release, c};
+    const struct services services = {2, tell, allocate, release, NULL, c};
     const enum use use = type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION;
     if (instance_start(&c->instance, use, &services, logging != 0) != REFUSED &&
         is_acceptable(&c->instance, type, guid))

@@ -18,6 +18,7 @@ struct component {
     struct instance instance;
     fmi3InstanceEnvironment environment;
     fmi3LogMessageCallback log;
+    fmi3IntermediateUpdateCallback update;
 };
 
 static fmi3Status status_of(enum verdict verdict)
@@ -44,6 +45,15 @@ static void *allocate(void *sink, size_t size)
 static void release(void *sink, void *memory)
 {
     memory_release(memory);
+}
+
+/* Inputs alone: what is read belongs to the communication point. */
+static void ask(void *sink, double time)
+{
+    const struct component *c = sink;
+    bool early = false;
+    double early_time = 0.0;
+    c->update(c->environment, time, true, false, false, false, &early, &early_time);
 }
 
 static fmi3Status refuse(struct instance *instance, const char *name, const char *why)
@@ -80,7 +90,7 @@ static struct component *made(enum use use, fmi3String token, bool logging, fmi3
     struct component *c = memory_allocate(1, sizeof *c);
     if (!c)
         return NULL;
-    const struct services services = {3, tell, allocate, release, c};
+    const struct services services = {3, tell, allocate, release, NULL, c};
     c->environment = environment;
     c->log = log;
     if (instance_start(&c->instance, use, &services, logging) != REFUSED && is_acceptable(&c->instance, token))
@@ -98,12 +108,20 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
 {
     static const char call[] = "fmi3InstantiateCoSimulation";
     struct component *c = made(CO_SIMULATION, token, logging, environment, log);
-    if (!c || (!event_mode_used && n_intermediate == 0))
-        return c;
+    bool refused = event_mode_used;
+    if (!c)
+        return NULL;
     if (event_mode_used)
         refuse(&c->instance, call, "eventModeUsed must be false: hasEventMode is false");
-    else
-        refuse(&c->instance, call, "requiredIntermediateVariables must be empty: providesIntermediateUpdate is false");
+    for (size_t i = 0; i < n_intermediate && !refused; i++) {
+        refused = !intermediate || instance_place(INPUTS, INPUT_COUNT, intermediate[i]) == INPUT_COUNT;
+        if (refused)
+            refuse(&c->instance, call, "requiredIntermediateVariables must be inputs: no other has intermediateUpdate");
+    }
+    c->update = update;
+    c->instance.services.ask = update ? ask : NULL;
+    if (!refused)
+        return c;
     memory_release(c);
     return NULL;
 }

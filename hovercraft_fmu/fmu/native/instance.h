@@ -33,6 +33,7 @@ struct services {
     void (*tell)(void *sink, enum verdict verdict, const char *category, const char *message);
     void *(*allocate)(void *sink, size_t size);
     void (*release)(void *sink, void *memory);
+    void (*ask)(void *sink, double time); /* for inputs inside a step; NULL: nobody to ask */
     void *sink;
 };
 
@@ -66,6 +67,7 @@ struct instance {
     struct services services;
     bool warnings, errors; /* the categories that are logged */
     enum verdict last_step;
+    unsigned refusals; /* that were said */
     struct environment host; /* its floating-point environment, while a call is inside */
     bool inside;
 };

@@ -161,8 +161,10 @@ double kernel_steering(const struct controls *controls, const struct craft *craf
 
 struct controls kernel_controls_at(const struct drive *drive, double time)
 {
-    if (!drive->ramped)
+    if (!drive->varies)
         return drive->start;
+    if (drive->ask)
+        return drive->ask(drive->asked, time);
     return (struct controls){
         .thrust = drive->start.thrust + time * drive->rate.thrust,
         .port = drive->start.port + time * drive->rate.port,
@@ -172,11 +174,11 @@ struct controls kernel_controls_at(const struct drive *drive, double time)
     };
 }
 
-/* Whether the air moves, now or later in the step. */
+/* Whether the air moves, now or later in the step, or could. */
 static bool is_windy(const struct drive *drive)
 {
     const struct controls *start = &drive->start, *rate = &drive->rate;
-    return start->wind_x != 0.0 || start->wind_y != 0.0 || rate->wind_x != 0.0 || rate->wind_y != 0.0;
+    return drive->ask || start->wind_x != 0.0 || start->wind_y != 0.0 || rate->wind_x != 0.0 || rate->wind_y != 0.0;
 }
 
 enum drag_kind { WITHOUT_DRAG, PLAIN_DRAG, ANY_DRAG };
@@ -216,7 +218,7 @@ static void steer(struct load_function *f, const struct controls *controls)
 /* The controls at a time [s] after the start. */
 static inline void steer_at(struct load_function *f, double time)
 {
-    if (f->drive->ramped) {
+    if (f->drive->varies) {
         const struct controls controls = kernel_controls_at(f->drive, f->begun + time);
         steer(f, &controls);
     }

@@ -52,12 +52,15 @@ struct controls {
     double wind_x, wind_y;  /* m/s: the velocity of the air */
 };
 
-/* The controls over a communication step: `start + t*rate`, then saturated. Without ramps they hold, and the bits are
-   those of the Python model, which knows none. */
+/* The controls over a communication step: `start + t*rate`, or what is answered when asked, then saturated. Else they
+   hold, and the bits are those of the Python model, which knows neither. */
 struct drive {
     struct controls start;
     struct controls rate; /* per s */
-    bool ramped;          /* some rate is not zero */
+    bool varies;          /* some rate is not zero, or there is somebody to ask */
+    struct controls (*ask)(void *asked, double time); /* s, after the start; NULL: nobody. A time may come again, or be
+                                                         followed by an earlier one, as a step is tried again */
+    void *asked;
 };
 
 struct loads {

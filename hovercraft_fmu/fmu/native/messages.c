@@ -13,6 +13,7 @@ enum verdict instance_say(struct instance *instance, enum verdict verdict, const
 {
     char message[TEXT_SIZE];
     va_list values;
+    instance->refusals += verdict == REFUSED;
     va_start(values, format);
     text_format(message, format, values);
     va_end(values);

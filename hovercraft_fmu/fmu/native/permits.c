@@ -3,8 +3,8 @@
 #include "instance.h"
 
 #define IN(phase) (1u << (phase))
-#define PAST(phase) (~0u << (phase) << 1)
-#define EVER (~0u)
+#define EVER (~IN(INTERMEDIATE_UPDATE)) /* inside a step almost nothing may be called */
+#define PAST(phase) (~0u << (phase) << 1 & EVER)
 #define SOLVED (IN(EVENT_MODE) | IN(CONTINUOUS_TIME)) /* the phases that are model exchange's alone */
 
 struct permit {
@@ -26,7 +26,7 @@ static const struct permit PERMITS[CALL_COUNT] = {
 
     [GET_REALS] = {.names = {"fmi2GetReal", "fmi3GetFloat64"}, .phases = EVER},
     [SET_REALS] = {.names = {"fmi2SetReal", "fmi3SetFloat64"},
-                   .phases = EVER}, /* each variable has phases of its own */
+                   .phases = EVER | IN(INTERMEDIATE_UPDATE)}, /* each variable has phases of its own */
     [GET_INTEGERS] = {.names = {"fmi2GetInteger", "fmi3GetInt32"}, .phases = EVER},
     [SET_INTEGERS] = {.names = {"fmi2SetInteger", "fmi3SetInt32"}, .phases = EVER},
     [GET_ENUMERATIONS] = {.names = {"fmi2GetInteger", "fmi3GetInt64"}, .phases = EVER},

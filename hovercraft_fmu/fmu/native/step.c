@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+static const double SAME_STAGE = 1e-12; /* relative: times as near as that differ by rounding alone */
+
 /* s: from a time to the next double that is larger in size. */
 static double spacing_at(double time)
 {
@@ -174,17 +176,51 @@ static enum verdict worse(enum verdict a, enum verdict b)
     return a > b ? a : b;
 }
 
-/* The inputs over the step. Refused: a ramp that leaves the range of numbers. */
-static enum verdict make_drive(struct instance *instance, double step, struct drive *drive, struct controls *end)
+/* A step in which the host is asked for inputs. */
+struct inquiry {
+    struct instance *instance;
+    const struct craft *craft;
+    double point, end;     /* s: as the host has them */
+    double step;           /* s: as it is made */
+    double last;           /* s, after the point: when it was asked */
+    struct controls start; /* or what was outside its limits later */
+};
+
+/* The inputs at a time: the host's, or as they were where it sets nothing. Equal times are asked for once: the end of a
+   sub-step is the start of the next. */
+static struct controls inputs_at(void *asked, double time)
 {
-    const double *rates = instance->now.rates;
+    struct inquiry *inquiry = asked;
+    struct instance *instance = inquiry->instance;
+    struct content *now = &instance->now;
+    const struct services *services = &instance->services;
+    time = time < inquiry->step ? time : inquiry->step; /* sub-steps add up to the step but for rounding */
+    if (fabs(time - inquiry->last) <= SAME_STAGE * time)
+        return now->inputs;
+    inquiry->last = time;
+    const bool is_within = time < inquiry->step && inquiry->point + time < inquiry->end;
+    const volatile double at = is_within ? inquiry->point + time : inquiry->end; /* not in the host's environment */
+    now->phase = INTERMEDIATE_UPDATE;
+    const bool inside = instance_go_out(instance);
+    services->ask(services->sink, at);
+    instance_come_back(instance, inside);
+    now->phase = STEPPING;
+    if (held_input(&now->inputs, inquiry->craft).input < INPUT_COUNT)
+        inquiry->start = now->inputs;
+    return now->inputs;
+}
+
+/* The inputs over the step. Refused: a ramp that leaves the range of numbers. */
+static enum verdict make_drive(struct inquiry *inquiry, struct drive *drive, struct controls *end)
+{
+    struct instance *instance = inquiry->instance;
+    const double *rates = instance->now.rates, step = inquiry->step;
     double ends[INPUT_COUNT];
     bool finite = true;
-    drive->start = instance->now.inputs;
+    *drive = (struct drive){.start = instance->now.inputs};
     memcpy(&drive->rate, rates, sizeof drive->rate);
-    drive->ramped = false;
     for (unsigned i = 0; i < INPUT_COUNT; i++)
-        drive->ramped = drive->ramped || rates[i] != 0.0;
+        drive->varies = drive->varies || rates[i] != 0.0;
     *end = kernel_controls_at(drive, step);
     memcpy(ends, end, sizeof ends);
     for (unsigned i = 0; i < INPUT_COUNT; i++)
@@ -202,17 +238,30 @@ static enum verdict take_step(struct instance *instance, double point, double st
     struct craft craft = now->craft;
     struct stretch stretch = {.substeps = 0};
     const double end_time = point + step;
+    struct inquiry inquiry = {instance, &craft, point, end_time, step, -INFINITY, now->inputs};
+    const unsigned refusals = instance->refusals;
     if (check_step(instance, point, step) == REFUSED)
         return REFUSED;
-    step = kernel_meant_step(point, step, now->start_time, now->settings.step_size);
+    inquiry.step = step = kernel_meant_step(point, step, now->start_time, now->settings.step_size);
     if (now->tuned && instance_make_craft(instance, &craft) == REFUSED)
         return REFUSED;
-    if (make_drive(instance, step, &drive, &end) == REFUSED)
+    if (make_drive(&inquiry, &drive, &end) == REFUSED)
         return REFUSED;
+    if (instance->services.ask) {
+        drive.varies = true;
+        drive.ask = inputs_at;
+        drive.asked = &inquiry;
+        inquiry.start = drive.start = inputs_at(&inquiry, 0.0);
+    }
     const enum outcome outcome =
         kernel_advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
     if (outcome != ADVANCED)
         return refuse_step(instance, outcome, step, &stretch);
+    if (instance->services.ask)
+        end = inputs_at(&inquiry, step);
+    if (instance->refusals != refusals)
+        return instance_say(instance, REFUSED,
+                            "step from %r s: a call inside it was refused; the state of %r s stands", point, now->time);
     if (check_watched(instance, stretch.stability, stretch.rotation) == REFUSED)
         return REFUSED;
     now->state = stretch.state;
@@ -228,11 +277,17 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->rated = 0;
     enum verdict verdict = count_substeps(instance, stretch.substeps);
     verdict = worse(verdict, warn_of_the_step(instance));
-    verdict = worse(verdict, instance_warn_of_held_inputs(instance, &drive.start));
+    verdict = worse(verdict, instance_warn_of_held_inputs(instance, &inquiry.start));
     return worse(verdict, instance_warn_of_held_inputs(instance, &end));
 }
 
 enum verdict instance_step(struct instance *instance, double point, double step)
 {
-    return instance->last_step = take_step(instance, point, step);
+    const struct controls inputs = instance->now.inputs;
+    const enum verdict verdict = take_step(instance, point, step);
+    if (verdict == REFUSED && instance->services.ask) { /* what was set inside it, too */
+        instance->now.inputs = inputs;
+        instance_spread(instance->now.reals, &inputs, INPUTS, INPUT_COUNT);
+    }
+    return instance->last_step = verdict;
 }

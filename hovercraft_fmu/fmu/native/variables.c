@@ -182,7 +182,7 @@ static enum verdict check_real(struct instance *instance, const struct variable 
 static void after_set(struct instance *instance, bool parameter)
 {
     instance->now.tuned = instance->now.tuned || parameter;
-    if (instance->now.phase != STEPPING)
+    if (instance->now.phase != STEPPING && instance->now.phase != INTERMEDIATE_UPDATE)
         instance->now.motion_unread = instance->now.action_unread = true;
 }
 

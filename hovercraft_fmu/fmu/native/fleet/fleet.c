@@ -165,7 +165,7 @@ static struct drive drive_at(const struct fleet *fleet, int64_t i)
     return (struct drive){
         .start = controls_at(fleet->controls, i),
         .rate = rate,
-        .ramped = rate.thrust != 0.0 || rate.port != 0.0 || rate.starboard != 0.0 || rate.wind_x != 0.0 ||
+        .varies = rate.thrust != 0.0 || rate.port != 0.0 || rate.starboard != 0.0 || rate.wind_x != 0.0 ||
                   rate.wind_y != 0.0,
     };
 }
@@ -277,7 +277,7 @@ static bool joins(struct block *block, const struct fleet *fleet, const struct w
     const struct craft craft = craft_at(fleet, i);
     const double time = euler ? h : 1.0;
     const struct load_function f = load_function(&drive, &craft, time / craft.mass, time / craft.inertia);
-    if (drive.ramped || rubs(&craft) || f.kind != PLAIN_DRAG)
+    if (drive.varies || rubs(&craft) || f.kind != PLAIN_DRAG)
         return false;
     const int lane = block->filled++;
     block->n = n;
