@@ -27,7 +27,8 @@ from hovercraft_fmu.fmu.description import NATIVE, Flavour
 from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, headers, sources
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
-from hovercraft_fmu.model.integrators import INTEGRATORS, Stretch
+from hovercraft_fmu.model.error_estimate import Companion
+from hovercraft_fmu.model.integrators import INTEGRATORS, Integrator, Stretch
 from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import SCENES
 
@@ -98,6 +99,14 @@ class CStretch(Structure):
     ]
 
 
+class CCompanion(Structure):
+    _fields_ = [("state", CState), ("proposed", c_double)]
+
+
+class CError(Structure):
+    _fields_ = [("position", c_double), ("heading", c_double)]
+
+
 class CLoads(Structure):
     _fields_ = [(name, c_double) for name in ("x", "y", "moment", "kq")]
 
@@ -106,12 +115,21 @@ def numbers_of(structure: Structure, names: Sequence[str]) -> tuple[float, ...]:
     return tuple(getattr(structure, name) for name in names)
 
 
+def _drive(controls: Controls, rate: Controls) -> CDrive:
+    return CDrive(CControls(*controls), CControls(*rate), any(rate))
+
+
+def _chosen(settings: Settings) -> CSettings:
+    return CSettings(settings.step_size, INTEGRATORS.index(settings.integrator) + 1, settings.tolerance)
+
+
 class Kernel:
     """kernel.c in a shared library."""
 
     def __init__(self, library: Path) -> None:
         self.library: Any = CDLL(str(library))
         self.library.kernel_loads_on.restype = CLoads
+        self.library.kernel_estimated_error.restype = CError
         for function, arguments in ((self.library.kernel_rounding, 3), (self.library.kernel_meant_step, 4)):
             function.restype, function.argtypes = c_double, (c_double,) * arguments
 
@@ -126,16 +144,39 @@ class Kernel:
         rate: Controls = NO_RAMP,
     ) -> tuple[str, Stretch]:
         """What came of it (see OUTCOMES), and the stretch."""
-        drive = CDrive(CControls(*controls), CControls(*rate), any(rate))
-        number = INTEGRATORS.index(settings.integrator) + 1
-        chosen = CSettings(settings.step_size, number, settings.tolerance)
-        made = CStretch()
+        drive, chosen, made = _drive(controls, rate), _chosen(settings), CStretch()
         outcome = self.library.kernel_advance(
             byref(CState(*state)), byref(drive), byref(CCraft(*astuple(craft))), c_double(communication_step),
             byref(chosen), c_double(proposed), byref(made),
         )  # fmt: skip
         reached = State(*numbers_of(made.state, State._fields))
         return OUTCOMES[outcome], Stretch(reached, made.substeps, made.stability, made.rotation, made.proposed)
+
+    def accompany(
+        self,
+        companion: Companion,
+        controls: Controls,
+        craft: Craft,
+        communication_step: float,
+        settings: Settings,
+        made: tuple[int, float],
+        rate: Controls = NO_RAMP,
+    ) -> Companion:
+        """Beside a craft that made so many sub-steps of a size [s]."""
+        beside = CCompanion(CState(*companion.state), companion.proposed)
+        drive, chosen = _drive(controls, rate), _chosen(settings)
+        self.library.kernel_accompany(
+            byref(beside), byref(drive), byref(CCraft(*astuple(craft))), c_double(communication_step), byref(chosen),
+            byref(CStretch(substeps=made[0], substep=made[1])),
+        )  # fmt: skip
+        return Companion(State(*numbers_of(beside.state, State._fields)), beside.proposed)
+
+    def estimated_error(
+        self, state: State, companion: Companion, craft: Craft, method: Integrator
+    ) -> tuple[float, ...]:
+        beside = CCompanion(CState(*companion.state), companion.proposed)
+        arguments = byref(CState(*state)), byref(beside), byref(CCraft(*astuple(craft))), method.order
+        return numbers_of(self.library.kernel_estimated_error(*arguments), ("position", "heading"))
 
     def rounding(self, *arguments: float) -> float:
         """As in subcycling.py."""

@@ -10,6 +10,7 @@ from fmpy.fmi1 import FMICallException
 
 from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, HOSTS, INPUT_REFERENCES, hosts_of
 from hovercraft_fmu.fmu.interface import HOVERCRAFT, OUTPUTS, VARIABLES
+from hovercraft_fmu.model.error_estimate import ON
 from hovercraft_fmu.model.integrators import integrator_number
 from hovercraft_fmu.simulation import plan
 from hovercraft_fmu.sweep.study import read_study
@@ -17,8 +18,8 @@ from tests.conftest import Fresh
 from tests.lowlevel import everything, get, one, reference
 
 RK4, DIRECTIONAL = integrator_number("rk4"), 2
-BY_NUMBER = {"integrator_number": RK4, "drag_area_number": DIRECTIONAL}
-BY_ITEM = {"integrator": RK4, "drag_area": DIRECTIONAL}
+BY_NUMBER = {"integrator_number": RK4, "drag_area_number": DIRECTIONAL, "error_estimate_number": ON}
+BY_ITEM = {"integrator": RK4, "drag_area": DIRECTIONAL, "error_estimate": ON}
 FRACTIONS = {"step_size": 0.1, "rotational_drag": 0.5}
 """With steps this long every method gives other bits."""
 
@@ -102,6 +103,7 @@ def test_a_number_of_no_item_is_refused(each_fmu: Path, value: int) -> None:
             f"integrator_number = {value}: must be 0 (as integrator says) or one of 1 (semi_implicit_euler), "
             "2 (drag_implicit), 3 (rk4), 4 (adaptive)",
             f"drag_area_number = {value}: must be 0 (as drag_area says) or one of 1 (constant), 2 (directional)",
+            f"error_estimate_number = {value}: must be 0 (as error_estimate says) or one of 1 (off), 2 (on)",
         ]
 
 

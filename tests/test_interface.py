@@ -9,7 +9,7 @@ import fmpy
 import pytest
 from lxml import etree
 
-from hovercraft_fmu.fmu.interface import ACTION, HOVERCRAFT, INPUTS, MOTION, STATES, VARIABLES, WATCHED
+from hovercraft_fmu.fmu.interface import ACTION, ERRORS, HOVERCRAFT, INPUTS, MOTION, STATES, VARIABLES, WATCHED
 from hovercraft_fmu.model.integrators import INTEGRATORS
 
 # name: (causality, variability, initial, unit, start)
@@ -61,6 +61,10 @@ TABLE = {
     "rotational_drag": ("parameter", "tunable", "exact", "1", "0.0"),
     "integrator_number": ("parameter", "fixed", "exact", None, "0"),
     "drag_area_number": ("parameter", "fixed", "exact", None, "0"),
+    "error_estimate": ("parameter", "fixed", "exact", None, "1"),
+    "error_estimate_number": ("parameter", "fixed", "exact", None, "0"),
+    "error.position": ("output", "continuous", "calculated", "m", None),
+    "error.heading": ("output", "continuous", "calculated", "rad", None),
 }
 
 
@@ -119,6 +123,7 @@ def test_units(description: Any, xml: Any) -> None:
     [
         ("integrator", "Integrator", [method.name for method in INTEGRATORS]),
         ("drag_area", "DragArea", ["constant", "directional"]),
+        ("error_estimate", "ErrorEstimate", ["off", "on"]),
     ],
 )
 def test_enumerations_have_described_items(variable: str, type_name: str, names: list[str], xml: Any) -> None:
@@ -131,13 +136,15 @@ def test_enumerations_have_described_items(variable: str, type_name: str, names:
 
 def test_model_structure(description: Any) -> None:
     outputs = {u.variable.name: u.dependencies for u in description.outputs}
-    assert outputs == {name: [] for name in (*STATES, *MOTION)}
+    assert outputs == {name: [] for name in (*STATES, *MOTION, *ERRORS)}
     unknowns = {u.variable.name: {v.name for v in u.dependencies} for u in description.initialUnknowns}
     assert unknowns == {
         "body.surge": {"pose.heading", "velocity.x", "velocity.y"},
         "body.sway": {"pose.heading", "velocity.x", "velocity.y"},
         "speed": {"velocity.x", "velocity.y"},
         "projected_area": {"length", "width", "height"},
+        "error.position": set(),
+        "error.heading": set(),
     }
 
 
@@ -161,4 +168,4 @@ def test_the_head_of_the_description(description: Any, xml: Any) -> None:
 
 def test_the_groups_of_the_table_cover_it() -> None:
     names = [v.name for v in VARIABLES if v.variability == "continuous"]
-    assert names == [*INPUTS[:3], *STATES, *MOTION, *ACTION, *WATCHED, *INPUTS[3:]]
+    assert names == [*INPUTS[:3], *STATES, *MOTION, *ACTION, *WATCHED, *INPUTS[3:], *ERRORS]

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hovercraft_fmu.fmu.interface import BY_NAME, DERIVATIVES, INPUTS, STATES
+from hovercraft_fmu.fmu.interface import BY_NAME, DERIVATIVES, ERRORS, INPUTS, STATES
 from hovercraft_fmu.host import read_description
 from hovercraft_fmu.model import dynamics
 from hovercraft_fmu.model.craft import Craft
@@ -316,14 +316,15 @@ def test_dependencies_are_where_partial_derivatives_are_not_zero(use: str, descr
     instance.setInteger([reference("drag_area")], [2])
     go(instance)
     dice = np.random.default_rng(1)
-    acts = np.zeros((len(UNKNOWNS), len(KNOWNS)), dtype=bool)
+    unknowns = (*UNKNOWNS, *ERRORS)
+    acts = np.zeros((len(unknowns), len(KNOWNS)), dtype=bool)
     for _ in range(20):
         put_states(instance, dice.normal(size=6))
         instance.setReal([reference(name) for name in INPUTS], [5.0, 0.5, 0.5, *dice.normal(size=2)])
-        acts |= jacobian(instance) != 0.0
+        acts |= jacobian(instance, unknowns) != 0.0
     for unknown in getattr(description, use):
         listed = {variable.name for variable in unknown.dependencies} - set(TUNABLE)
-        row = UNKNOWNS.index(unknown.variable.name)
+        row = unknowns.index(unknown.variable.name)
         assert listed == {name for name, each in zip(KNOWNS, acts[row], strict=True) if each}, unknown.variable.name
 
 
@@ -398,5 +399,5 @@ def test_initial_dependencies_are_where_partial_derivatives_are_not_zero(descrip
     listed = {u.variable.name: {v.name for v in u.dependencies} for u in description.initialUnknowns}
     assert listed == {
         unknown: {known for (each, known), does in acts.items() if does and each == unknown}
-        for unknown in INITIAL_UNKNOWNS
+        for unknown in (*INITIAL_UNKNOWNS, *ERRORS)
     }

@@ -7,6 +7,7 @@ from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .._version import RELEASE_DATE, __version__
+from ..model.error_estimate import OFF
 from .block import guid
 from .interface import CRAFT_PARAMETERS, DERIVATIVES, HOVERCRAFT, INPUTS, STATES, TIME
 from .variable import Kind, Model, Variable
@@ -43,6 +44,8 @@ CAPABILITIES_3 = {
     "providesEvaluateDiscreteStates": "false",
 }
 """Of FMI 3.0, whatever the interface. Early return and clocks: nothing that could check them."""
+STEPS_ALONE = (("skirt_friction", 0.0), ("error_estimate", OFF))
+"""What co-simulation alone offers, and its value that is off."""
 PARTS = (
     "exchange.c",
     "instance.c",
@@ -104,12 +107,12 @@ class Flavour:
         return replace(self, model=model, identifier=model.name)
 
     def variant(self, name: str, starts: Mapping[str, float | int]) -> "Flavour":
-        """The same FMU under another name, with start values of its own. Where skirt and ground rub it offers no model
-        exchange.
+        """The same FMU under another name, with start values of its own. Where skirt and ground rub, or its error is
+        estimated, it offers no model exchange.
         """
         model = self.model.variant(name, starts)
-        rubs = "skirt_friction" in model.by_name and model.by_name["skirt_friction"].start
-        return replace(self.of(model), exchange={} if rubs else self.exchange, variant_of=self)
+        alone = any(name in model.by_name and model.by_name[name].start != off for name, off in STEPS_ALONE)
+        return replace(self.of(model), exchange={} if alone else self.exchange, variant_of=self)
 
     @property
     def own_starts(self) -> dict[str, float | int]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from ..model.craft import DRAG_AREAS, Craft
+from ..model.error_estimate import ERROR_ESTIMATES, LARGEST, OFF
 from ..model.integrators import INTEGRATORS
 from .variable import Enumeration, Model, Variable
 
@@ -12,13 +13,14 @@ SUBSTEPS_MAX = 2147483647
 HELD = 1e-9
 """Relative to the limit (at least 1): an input beyond it by less is a rounding of the host's interpolation."""
 
-INPUT_HELD, COUNTER_STOPPED, STEP_UNSTABLE, STEP_TURNS = 1, 2, 4, 8
+INPUT_HELD, COUNTER_STOPPED, STEP_UNSTABLE, STEP_TURNS, ERROR_LOST = 1, 2, 4, 8, 16
 WARNINGS: Mapping[int, str] = MappingProxyType(
     {
         INPUT_HELD: "an input was outside its limits and was held at the limit",
         COUNTER_STOPPED: "the counter of sub-steps reached its end and stopped",
         STEP_UNSTABLE: "the sub-step is too long for the drag: answers are bounded but wrong, or diverge",
         STEP_TURNS: "the craft turns too far in a sub-step: answers are wrong however stable",
+        ERROR_LOST: "the error estimate cannot be trusted: the answers are off by more than it can tell",
     }
 )
 """The bits of the variable `warnings`; each is logged when it is first set."""
@@ -30,7 +32,8 @@ INTEGRATOR = Enumeration(
     tuple((method.name, method.description) for method in INTEGRATORS),
 )
 DRAG_AREA = Enumeration("DragArea", "The area that the drag coefficient refers to", DRAG_AREAS)
-ENUMERATIONS = (INTEGRATOR, DRAG_AREA)
+ERROR_ESTIMATE = Enumeration("ErrorEstimate", "Whether the FMU estimates its own error", ERROR_ESTIMATES)
+ENUMERATIONS = (INTEGRATOR, DRAG_AREA, ERROR_ESTIMATE)
 
 
 _CRAFT = Craft()
@@ -155,6 +158,14 @@ VARIABLES: tuple[Variable, ...] = (
              minimum=0.0, maximum=1.0),
     _number_of(45, "integrator", INTEGRATOR),
     _number_of(46, "drag_area", DRAG_AREA),
+    Variable(47, "error_estimate", "parameter", "fixed", None, OFF, ERROR_ESTIMATE.description + ", in co-simulation",
+             kind="Enumeration", minimum=1, maximum=len(ERROR_ESTIMATE.items), enumeration=ERROR_ESTIMATE),
+    _number_of(48, "error_estimate", ERROR_ESTIMATE),
+    Variable(49, "error.position", "output", "continuous", "m", None,
+             "Estimated distance of the position from the exact solution for the inputs that were given; 0 where "
+             f"error_estimate is off, {LARGEST:.0e} where there is none", minimum=0.0, maximum=LARGEST),
+    Variable(50, "error.heading", "output", "continuous", "rad", None,
+             "Estimated distance of the heading from it, in the same way", minimum=0.0, maximum=LARGEST),
 )  # fmt: skip
 
 TIME = Variable(1000, "time", "independent", "continuous", "s", None, "Simulation time")
@@ -172,6 +183,8 @@ DERIVATIVES = tuple(v.name for state in STATES for v in VARIABLES if v.derivativ
 CRAFT_PARAMETERS = tuple(v.name for v in VARIABLES if v.name in Craft.__dataclass_fields__)
 WATCHED = ("stability_number", "rotation_per_substep")
 """What decides whether to trust the answers; kept by who steps, since initialization."""
+ERRORS = ("error.position", "error.heading")
+"""In the order of `estimated_error`."""
 MOTION = ("body.surge", "body.sway", "speed")
 """In the order of `observe_motion`."""
 ACTION = (

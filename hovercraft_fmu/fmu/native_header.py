@@ -16,6 +16,8 @@ from .interface import (
     CRAFT_PARAMETERS,
     DERIVATIVES,
     ENUMERATIONS,
+    ERROR_LOST,
+    ERRORS,
     HELD,
     HOVERCRAFT,
     INPUT_HELD,
@@ -91,6 +93,7 @@ struct variant {{
 
 struct method {{
     const char *name;
+    int order;              /* of the error, as a power of the sub-step */
     double stability_limit; /* 1 */
     double rotation_limit;  /* rad */
 }};
@@ -141,6 +144,7 @@ static const unsigned DERIVATIVES[] = {{{derivatives}}}; /* of STATES */
 static const double NOMINALS[] = {{{nominals}}};         /* of STATES, in their units */
 static const unsigned KNOWNS[] = {{{knowns}}};
 static const unsigned ROWS[] = {{{rows}}};
+static const unsigned ERRORS[] = {{{errors}}};
 static const unsigned MOTION[] = {{{motion}}};
 static const unsigned ACTION[] = {{{action}}};
 static const unsigned WATCHED[] = {{{watched}}};
@@ -171,6 +175,8 @@ OF_A_KIND = {
     "drag_area": "DRAG_AREA_RULE",
     "integrator_number": "INTEGRATOR_NUMBER_RULE",
     "drag_area_number": "DRAG_AREA_NUMBER_RULE",
+    "error_estimate": "ERROR_ESTIMATE_RULE",
+    "error_estimate_number": "ERROR_ESTIMATE_NUMBER_RULE",
 }
 RULES = ("ANY", "POSITIVE", "NOT_NEGATIVE", *OF_A_KIND.values())
 
@@ -182,11 +188,13 @@ def variables_header(block: Block) -> str:
         "COUNTER_STOPPED": COUNTER_STOPPED,
         "STEP_UNSTABLE": STEP_UNSTABLE,
         "STEP_TURNS": STEP_TURNS,
+        "ERROR_LOST": ERROR_LOST,
     }
     craft_reals = [name for name in CRAFT_PARAMETERS if BY_NAME[name].kind == "Real"]
     counts = {
         "INPUT_COUNT": len(INPUTS),
         "STATE_COUNT": len(STATES),
+        "ERROR_COUNT": len(ERRORS),
         "MOTION_COUNT": len(MOTION),
         "ACTION_COUNT": len(ACTION),
         "WATCHED_COUNT": len(WATCHED),
@@ -218,7 +226,7 @@ def variables_header(block: Block) -> str:
         phase_names=", ".join(_quoted(words) for _, words in PHASES),
         variables="\n".join(f"    [{constant(v.name)}] = {_row(v)}," for v in VARIABLES),
         methods="\n".join(
-            f"    {{{_quoted(m.name)}, {_number(m.stability_limit)}, {_number(m.rotation_limit)}}},"
+            f"    {{{_quoted(m.name)}, {m.order}, {_number(m.stability_limit)}, {_number(m.rotation_limit)}}},"
             for m in INTEGRATORS
         ),
         choices="\n".join(
@@ -239,6 +247,7 @@ def variables_header(block: Block) -> str:
         row=_constants(rows, "ROW_"),
         knowns=_constants((*STATES, *INPUTS, *craft_reals)),
         rows=_constants(rows),
+        errors=_constants(ERRORS),
         motion=_constants(MOTION),
         action=_constants(ACTION),
         watched=_constants(WATCHED),

@@ -390,6 +390,8 @@ class Integrator(NamedTuple):
     """None for the adaptive method, which cuts the time itself."""
     stages: int
     """How many times a sub-step works out the loads; of adaptive, one that is taken."""
+    order: int
+    """Of the error, as a power of the sub-step."""
     stability_limit: float
     """1: the largest sub-step times the fastest linearized drag rate up to which answers can be trusted."""
     rotation_limit: float
@@ -402,6 +404,7 @@ INTEGRATORS = (
         "Semi-implicit (symplectic) Euler: first order; the pose from the new velocity",
         semi_implicit_euler,
         1,
+        1,
         2.0,
         0.5,
     ),
@@ -410,15 +413,17 @@ INTEGRATORS = (
         "Drag solved implicitly with its factor from the start of the sub-step: first order, stable at any step",
         drag_implicit,
         1,
+        1,
         2.0,  # it never diverges, but under thrust it overshoots above
         0.5,
     ),
-    Integrator("rk4", "The classic Runge-Kutta method: fourth order", rk4, 4, 2.785, 0.5),
+    Integrator("rk4", "The classic Runge-Kutta method: fourth order", rk4, 4, 4, 2.785, 0.5),
     Integrator(
         "adaptive",
         "Dormand-Prince 5(4) with steps that meet the tolerance; step_size is the first one",
         None,
         6,
+        5,
         math.inf,
         math.inf,
     ),

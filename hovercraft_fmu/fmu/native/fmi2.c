@@ -187,7 +187,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
-    return STATUS_OF(SIZE_FMU_STATE, state && size, instance_serialized_size(size));
+    return STATUS_OF(SIZE_FMU_STATE, state && size, instance_serialized_size(state, size));
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)

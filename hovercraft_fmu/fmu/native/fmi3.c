@@ -384,7 +384,7 @@ fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size)
 {
-    return STATUS_OF(SIZE_FMU_STATE, state && size, instance_serialized_size(size));
+    return STATUS_OF(SIZE_FMU_STATE, state && size, instance_serialized_size(state, size));
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)

@@ -133,8 +133,9 @@ static enum verdict take_up_start_values(struct instance *instance)
 {
     struct content *now = &instance->now;
     struct craft craft;
-    int32_t integrator;
-    if (instance_make_craft(instance, &craft) == REFUSED || choose(instance, V_INTEGRATOR, &integrator) == REFUSED)
+    int32_t integrator, error_estimate;
+    if (instance_make_craft(instance, &craft) == REFUSED || choose(instance, V_INTEGRATOR, &integrator) == REFUSED ||
+        choose(instance, V_ERROR_ESTIMATE, &error_estimate) == REFUSED)
         return REFUSED;
     now->craft = craft;
     now->settings = (struct settings){
@@ -145,6 +146,9 @@ static enum verdict take_up_start_values(struct instance *instance)
     instance_copy(&now->inputs, now->reals, INPUTS, INPUT_COUNT);
     instance_copy(&now->state, now->reals, STATES, STATE_COUNT);
     now->controls = now->inputs;
+    now->estimates = error_estimate == ON;
+    now->companion = (struct companion){.state = now->state};
+    now->way = 0.0;
     now->reals[V_PROJECTED_AREA] = kernel_derived(&craft).projected_area;
     now->tuned = false;
     now->motion_unread = now->action_unread = true;

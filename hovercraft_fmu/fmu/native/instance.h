@@ -56,6 +56,9 @@ struct content {
     struct craft craft;               /* of the last step; in model exchange now */
     struct settings settings;
     double proposed;                  /* s, the next step of the adaptive method */
+    bool estimates;                   /* its own error, by a companion: */
+    struct companion companion;
+    double way;                       /* m, so far, from communication point to communication point */
     double stability, rotation;       /* 1, rad: the largest of a sub-step so far */
     bool tuned;                       /* a parameter was set since the last step: the next one takes it up */
     bool motion_unread;               /* the motion in `reals` is not yet that of the communication point */
@@ -142,6 +145,10 @@ DOOR enum verdict instance_step(struct instance *instance, double point, double 
 /* A word where inputs are out of their limits, and whether it is still to be said of the inputs as they are now. */
 DOOR enum verdict instance_warn_of_held_inputs(struct instance *instance, const struct controls *controls);
 DOOR bool instance_has_to_warn(const struct instance *instance);
+/* By its companion, at the communication point; 0 where it has none. */
+DOOR struct error instance_error(const struct content *content);
+/* And how fast it grows [m/s, rad/s]. */
+DOOR struct error instance_error_rate(const struct content *content);
 
 /* ---- variables.c */
 DOOR enum verdict instance_get_reals(struct instance *instance, const unsigned *references, size_t n, double *values);
@@ -206,7 +213,7 @@ DOOR enum verdict instance_adjoint_derivatives(struct instance *instance, const 
                                                double *values);
 
 /* ---- serialize.c: the same bytes on every platform. */
-DOOR enum verdict instance_serialized_size(size_t *size);
+DOOR enum verdict instance_serialized_size(const struct content *content, size_t *size);
 /* Refused: less than that. */
 DOOR enum verdict instance_serialize(struct instance *instance, const struct content *content, unsigned char *bytes,
                                      size_t size);

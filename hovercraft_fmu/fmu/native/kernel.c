@@ -18,6 +18,11 @@ static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
 static const double NEAR_REST = 4.0;      /* sub-steps in which friction could stop the craft */
 static const double LEAST_SLIP = 1e-150;  /* m/s: so that at rest nothing is divided by zero */
 static const double UNIT = 0x1p-52;       /* relative: one or two units in the last place of a double */
+static const double LARGEST = 1e300;      /* m, rad: the estimate of an error where there is none */
+static const double TIGHTER = 32.0;       /* the adaptive companion's tolerance is smaller by this */
+static const double NOT_SMALL = 0.25;     /* of the way: an error above it is lost */
+static const int32_t EARLY = 20;          /* sub-steps: before that even a small error is not small beside the way */
+static const int FRICTION_ORDER = 2;      /* no method is of a higher one where friction stops the craft */
 static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds what is smaller, ties to even */
 
 /* With HOVERCRAFT_LIBM the platform's functions, which Python uses, too. */
@@ -164,7 +169,7 @@ struct controls kernel_controls_at(const struct drive *drive, double time)
     if (!drive->varies)
         return drive->start;
     if (drive->ask)
-        return drive->ask(drive->asked, time);
+        return drive->ask(drive->asked, drive->later + time);
     return (struct controls){
         .thrust = drive->start.thrust + time * drive->rate.thrust,
         .port = drive->start.port + time * drive->rate.port,
@@ -591,8 +596,8 @@ static struct stretch rk4_with_friction(const struct state *state, const struct 
     return whole;
 }
 
-static struct stretch rk4(const struct state *state, const struct drive *drive, const struct craft *craft, double h,
-                          int64_t n)
+static ALWAYS_INLINE struct stretch rk4(const struct state *state, const struct drive *drive,
+                                        const struct craft *craft, double h, int64_t n)
 {
     if (rubs(craft))
         return rk4_with_friction(state, drive, craft, h, n);
@@ -817,6 +822,23 @@ static enum outcome checked(struct stretch *stretch)
     return is_finite(&stretch->state) ? ADVANCED : NOT_FINITE;
 }
 
+/* By a method of fixed steps; in line, as a copy of what is reached would cost more than the branch. */
+static ALWAYS_INLINE enum outcome fixed(const struct state *state, const struct drive *drive,
+                                        const struct craft *craft, int32_t integrator, double h, int64_t n,
+                                        struct stretch *stretch)
+{
+    if (integrator == RK4) {
+        *stretch = rk4(state, drive, craft, h, n);
+    } else if (integrator == DRAG_IMPLICIT) {
+        struct load_function f = load_function(drive, craft, 1.0, 1.0);
+        *stretch = drag_implicit(state, &f, h, n);
+    } else {
+        struct load_function f = load_function(drive, craft, h / craft->mass, h / craft->inertia);
+        *stretch = semi_implicit_euler(state, &f, h, n);
+    }
+    return checked(stretch);
+}
+
 enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
                      double communication_step, const struct settings *settings, double proposed,
                      struct stretch *stretch)
@@ -828,14 +850,69 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
                         proposed != 0.0 ? proposed : settings->step_size, stretch);
     if (!substeps(communication_step, settings->step_size, &n, &h))
         return TOO_MANY_SUBSTEPS;
-    if (settings->integrator == RK4) {
-        *stretch = rk4(state, drive, craft, h, n);
-    } else if (settings->integrator == DRAG_IMPLICIT) {
-        struct load_function f = load_function(drive, craft, 1.0, 1.0);
-        *stretch = drag_implicit(state, &f, h, n);
-    } else {
-        struct load_function f = load_function(drive, craft, h / craft->mass, h / craft->inertia);
-        *stretch = semi_implicit_euler(state, &f, h, n);
+    return fixed(state, drive, craft, settings->integrator, h, n, stretch);
+}
+
+/* ---- error_estimate.py */
+
+static const struct companion LOST = {{NAN, NAN, NAN, NAN, NAN, NAN}, 0.0};
+
+/* Where the steps of the adaptive method are as long as the communication step, those of the companion are half. */
+static enum outcome in_two_halves(const struct companion *companion, const struct drive *drive,
+                                  const struct craft *craft, double communication_step,
+                                  const struct settings *settings, struct stretch *stretch)
+{
+    const double half = 0.5 * communication_step;
+    struct drive second = *drive;
+    *stretch = (struct stretch){.state = companion->state, .proposed = companion->proposed};
+    for (int i = 0; i < 2; i++) {
+        const struct state state = stretch->state;
+        if (i > 0) {
+            second.start = kernel_controls_at(drive, half);
+            second.later = half;
+        }
+        const double start = stretch->proposed != 0.0 ? stretch->proposed : settings->step_size;
+        const enum outcome outcome =
+            adaptive(&state, i > 0 ? &second : drive, craft, half, settings->tolerance / TIGHTER, start, stretch);
+        if (outcome != ADVANCED)
+            return outcome;
     }
-    return checked(stretch);
+    return ADVANCED;
+}
+
+void kernel_accompany(struct companion *companion, const struct drive *drive, const struct craft *craft,
+                      double communication_step, const struct settings *settings, const struct stretch *made)
+{
+    struct stretch stretch;
+    if (isnan(companion->state.x))
+        return;
+    const enum outcome outcome =
+        settings->integrator == ADAPTIVE
+            ? in_two_halves(companion, drive, craft, communication_step, settings, &stretch)
+            : fixed(&companion->state, drive, craft, settings->integrator, 0.5 * made->substep, 2 * made->substeps,
+                    &stretch);
+    *companion = outcome == ADVANCED && is_finite(&stretch.state) ? (struct companion){stretch.state, stretch.proposed}
+                                                                  : LOST;
+}
+
+double kernel_error_factor(const struct craft *craft, int order)
+{
+    const double gain = (double)(1 << (rubs(craft) && order > FRICTION_ORDER ? FRICTION_ORDER : order));
+    return gain / (gain - 1.0);
+}
+
+struct error kernel_estimated_error(const struct state *state, const struct companion *companion,
+                                    const struct craft *craft, int order)
+{
+    const struct state *other = &companion->state;
+    const double factor = kernel_error_factor(craft, order);
+    const double dx = other->x - state->x, dy = other->y - state->y;
+    const double position = factor * square_root(dx * dx + dy * dy);
+    const double heading = factor * fabs(other->heading - state->heading);
+    return (struct error){position <= LARGEST ? position : LARGEST, heading <= LARGEST ? heading : LARGEST};
+}
+
+bool kernel_is_lost(double position, double way, int32_t substeps)
+{
+    return position >= LARGEST || (substeps >= EARLY && position > NOT_SMALL * way);
 }

@@ -1,5 +1,5 @@
-/* The physics: model/craft.py, dynamics.py, integrators.py and subcycling.py, function by function, in the same order
-   of operations. Derivations stand there. SI units, world frame: x right, y down, heading from +x toward +y.
+/* The physics: model/craft.py, dynamics.py, integrators.py, subcycling.py and error_estimate.py, function by function,
+   in the same order of operations. Derivations stand there. SI units, world frame: x right, y down, heading from +x toward +y.
 
    It owns nothing and remembers nothing. Compile without contraction (-ffp-contract=off). Names that a linker sees
    have a prefix: glibc, for one, still has an `advance` of its own. */
@@ -61,6 +61,7 @@ struct drive {
     struct controls (*ask)(void *asked, double time); /* s, after the start; NULL: nobody. A time may come again, or be
                                                          followed by an earlier one, as a step is tried again */
     void *asked;
+    double later;         /* s: where in the communication step its time 0 is, for who is asked */
 };
 
 struct loads {
@@ -75,6 +76,20 @@ struct settings {
     double step_size; /* s */
     int32_t integrator;
     double tolerance; /* SI units */
+};
+
+/* Whether a companion is carried along. */
+enum error_estimate { OFF = 1, ON };
+
+struct companion {
+    struct state state; /* NaN: it has left the range of numbers, or found no step for its tolerance; so it stays */
+    double proposed;    /* s: the step that the adaptive method would take next */
+};
+
+/* How far a craft is off, by its companion. */
+struct error {
+    double position; /* m */
+    double heading;  /* rad */
 };
 
 struct stretch {
@@ -122,5 +137,15 @@ HIDDEN double kernel_meant_step(double time, double step, double start_time, dou
 HIDDEN enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
                                    double communication_step, const struct settings *settings, double proposed,
                                    struct stretch *stretch);
+/* The companion over the same communication step, which the craft itself has made. */
+HIDDEN void kernel_accompany(struct companion *companion, const struct drive *drive, const struct craft *craft,
+                             double communication_step, const struct settings *settings, const struct stretch *made);
+/* What the difference between the two is to be multiplied by, for a method of that order. */
+HIDDEN double kernel_error_factor(const struct craft *craft, int order);
+/* By now. */
+HIDDEN struct error kernel_estimated_error(const struct state *state, const struct companion *companion,
+                                           const struct craft *craft, int order);
+/* Whether such an estimate can be trusted no more, after a way [m] and so many sub-steps. */
+HIDDEN bool kernel_is_lost(double position, double way, int32_t substeps);
 
 #endif

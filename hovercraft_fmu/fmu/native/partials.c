@@ -18,15 +18,21 @@ static bool is_known(const struct instance *instance, unsigned reference)
     return place < KNOWN_COUNT || (instance->services.fmi == 3 && VARIABLES[reference].settable >> phase & 1u);
 }
 
+/* What the FMU says of its own error follows nothing at once: every derivative of it is 0. */
+static bool is_error(unsigned reference)
+{
+    return instance_place(ERRORS, ERROR_COUNT, reference) < ERROR_COUNT;
+}
+
 /* And its unknowns: in initialization mode those that are calculated then; later states and their derivatives, and what
    else is an output. */
 static bool is_unknown(enum phase phase, unsigned reference)
 {
     if (phase == INITIALIZING)
-        return instance_place(ROWS, ROW_COUNT, reference) < ROW_COUNT;
+        return instance_place(ROWS, ROW_COUNT, reference) < ROW_COUNT || is_error(reference);
     return instance_place(STATES, STATE_COUNT, reference) < STATE_COUNT ||
            instance_place(DERIVATIVES, STATE_COUNT, reference) < STATE_COUNT ||
-           instance_place(MOTION, MOTION_COUNT, reference) < MOTION_COUNT;
+           instance_place(MOTION, MOTION_COUNT, reference) < MOTION_COUNT || is_error(reference);
 }
 
 static enum verdict refuse_reference(struct instance *instance, enum call call, unsigned reference, const char *what,

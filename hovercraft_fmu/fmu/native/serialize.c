@@ -115,14 +115,19 @@ static void exchange(struct cursor *cursor, struct content *c)
     exchange_double(cursor, &c->proposed);
     exchange_double(cursor, &c->stability);
     exchange_double(cursor, &c->rotation);
+    if (c->estimates) { /* that is known by the size */
+        exchange_doubles(cursor, &c->companion.state, sizeof c->companion.state);
+        exchange_double(cursor, &c->companion.proposed);
+        exchange_double(cursor, &c->way);
+    }
     c->use = use == MODEL_EXCHANGE ? MODEL_EXCHANGE : CO_SIMULATION;
     c->phase = phase >= 0 && phase < PHASE_COUNT ? (enum phase)phase : PHASE_COUNT;
     c->tuned = tuned != 0;
 }
 
-static size_t serialized_size(void)
+static size_t serialized_size(bool estimates)
 {
-    struct content content = {.phase = INSTANTIATED};
+    struct content content = {.phase = INSTANTIATED, .estimates = estimates};
     struct cursor cursor = {MEASURE, NULL, NULL, HEAD_SIZE};
     exchange(&cursor, &content);
     return cursor.at + SUM_SIZE;
@@ -134,10 +139,11 @@ enum verdict instance_serialize(struct instance *instance, const struct content 
     struct content copy = *content;
     struct cursor cursor = {WRITE, bytes, NULL, MAGIC_SIZE};
     int32_t version = VERSION;
-    if (size < serialized_size())
+    const size_t needed = serialized_size(content->estimates);
+    if (size < needed)
         return instance_say(instance, REFUSED, "%s: size = %u: must be %u bytes",
                             call_name(instance, SERIALIZE_FMU_STATE), (unsigned long long)size,
-                            (unsigned long long)serialized_size());
+                            (unsigned long long)needed);
     memcpy(bytes, MAGIC, MAGIC_SIZE);
     exchange_integer(&cursor, &version);
     memcpy(bytes + cursor.at, variant()->build, BUILD_SIZE);
@@ -163,7 +169,7 @@ static bool is_of_this_build(const unsigned char *bytes, size_t size)
     struct cursor cursor = {READ, NULL, bytes, MAGIC_SIZE};
     int32_t version = 0;
     exchange_integer(&cursor, &version);
-    return version == VERSION && size == serialized_size() &&
+    return version == VERSION && (size == serialized_size(false) || size == serialized_size(true)) &&
            memcmp(bytes + cursor.at, variant()->build, BUILD_SIZE) == 0;
 }
 
@@ -184,7 +190,9 @@ static bool is_possible(const struct content *c)
     return is_phase_of_use(c) && kept >= 1 && kept <= most && number >= 0 && number <= most &&
            (!started || (used >= 1 && used <= most)) && c->reals[V_STEP_SIZE] > 0.0 &&
            (!started || c->settings.step_size > 0.0) && c->integers[V_SUBSTEPS] >= 0 &&
-           (c->use == CO_SIMULATION || (c->reals[V_SKIRT_FRICTION] == 0.0 && c->craft.skirt_friction == 0.0));
+           (c->use == CO_SIMULATION ||
+            (c->reals[V_SKIRT_FRICTION] == 0.0 && c->craft.skirt_friction == 0.0 && !c->estimates &&
+             c->integers[V_ERROR_ESTIMATE] != ON && c->integers[V_ERROR_ESTIMATE_NUMBER] != ON));
 }
 
 static enum verdict deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
@@ -200,6 +208,7 @@ static enum verdict deserialize(struct instance *instance, const unsigned char *
         return instance_say(instance, REFUSED, "FMU state of build %q: must be a state of this build, %q", build,
                             variant()->build);
     *content = instance->now; /* what is not among the bytes is worked out again */
+    content->estimates = size == serialized_size(true);
     exchange(&cursor, content);
     content->reals[V_PROJECTED_AREA] = kernel_derived(&content->craft).projected_area;
     content->motion_unread = content->action_unread = true;
@@ -220,8 +229,8 @@ enum verdict instance_deserialize(struct instance *instance, const unsigned char
     return FINE;
 }
 
-enum verdict instance_serialized_size(size_t *size)
+enum verdict instance_serialized_size(const struct content *content, size_t *size)
 {
-    *size = serialized_size();
+    *size = serialized_size(content->estimates);
     return FINE;
 }

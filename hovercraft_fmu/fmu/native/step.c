@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "root.h"
+
 static const double SAME_STAGE = 1e-12; /* relative: times as near as that differ by rounding alone */
 
 /* s: from a time to the next double that is larger in size. */
@@ -98,15 +100,38 @@ static bool is_held(double value, double limit)
     return fabs(value - limit) > HELD * larger(1.0, fabs(limit));
 }
 
-static const struct method *method_of(const struct instance *instance)
+static const struct method *method_of(const struct content *content)
 {
-    return &METHODS[instance->now.settings.integrator - 1];
+    return &METHODS[content->settings.integrator - 1];
+}
+
+struct error instance_error(const struct content *content)
+{
+    if (!content->estimates)
+        return (struct error){0.0, 0.0};
+    return kernel_estimated_error(&content->state, &content->companion, &content->craft, method_of(content)->order);
+}
+
+/* Along the difference of the two that of their velocities. */
+struct error instance_error_rate(const struct content *content)
+{
+    const struct state *s = &content->state, *other = &content->companion.state;
+    const double dx = other->x - s->x, dy = other->y - s->y, turned = other->heading - s->heading;
+    const double dvx = other->vx - s->vx, dvy = other->vy - s->vy, turning = other->yaw_rate - s->yaw_rate;
+    const double distance = square_root(dx * dx + dy * dy);
+    if (!content->estimates || isnan(other->x))
+        return (struct error){0.0, 0.0};
+    const double factor = kernel_error_factor(&content->craft, method_of(content)->order);
+    const double apart = distance > 0.0 ? (dx / distance) * dvx + (dy / distance) * dvy
+                                        : square_root(dvx * dvx + dvy * dvy);
+    const double leaves = turned > 0.0 ? turning : turned < 0.0 ? -turning : fabs(turning);
+    return (struct error){factor * apart, factor * leaves};
 }
 
 static enum verdict warn_of_the_step(struct instance *instance)
 {
     const struct content *now = &instance->now;
-    const struct method *method = method_of(instance);
+    const struct method *method = method_of(now);
     const double number = now->stability, rotation = now->rotation;
     enum verdict verdict = FINE;
     if (number > method->stability_limit && is_first(instance, STEP_UNSTABLE))
@@ -122,6 +147,27 @@ static enum verdict warn_of_the_step(struct instance *instance)
                                rotation, method->rotation_limit,
                                now->settings.step_size * method->rotation_limit / rotation);
     return verdict;
+}
+
+/* An estimate that is not small beside the way is none, nor one that has no companion left. */
+static enum verdict warn_of_the_error(struct instance *instance)
+{
+    const struct content *now = &instance->now;
+    const double position = instance_error(now).position;
+    if (!kernel_is_lost(position, now->way, now->integers[V_SUBSTEPS]) || !is_first(instance, ERROR_LOST))
+        return FINE;
+    return instance_say(instance, WARNED,
+                        "error.position = %4 m after a way of %4 m: is no estimate any more, the answers are lost; set "
+                        "a smaller %s (said once)",
+                        position, now->way, now->settings.integrator == ADAPTIVE ? "tolerance" : "step_size");
+}
+
+/* Where the craft goes, and its companion. */
+static void go_along(struct content *now, const struct companion *companion, const struct state *state)
+{
+    const double dx = state->x - now->state.x, dy = state->y - now->state.y;
+    now->companion = *companion;
+    now->way += square_root(dx * dx + dy * dy);
 }
 
 /* An input that is outside its limits, and where it is held. */
@@ -237,6 +283,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     struct controls end;
     struct craft craft = now->craft;
     struct stretch stretch = {.substeps = 0};
+    struct companion companion;
     const double end_time = point + step;
     struct inquiry inquiry = {instance, &craft, point, end_time, step, -INFINITY, now->inputs};
     const unsigned refusals = instance->refusals;
@@ -257,6 +304,10 @@ static enum verdict take_step(struct instance *instance, double point, double st
         kernel_advance(&now->state, &drive, &craft, step, &now->settings, now->proposed, &stretch);
     if (outcome != ADVANCED)
         return refuse_step(instance, outcome, step, &stretch);
+    if (now->estimates) {
+        companion = now->companion;
+        kernel_accompany(&companion, &drive, &craft, step, &now->settings, &stretch);
+    }
     if (instance->services.ask)
         end = inputs_at(&inquiry, step);
     if (instance->refusals != refusals)
@@ -264,6 +315,8 @@ static enum verdict take_step(struct instance *instance, double point, double st
                             "step from %r s: a call inside it was refused; the state of %r s stands", point, now->time);
     if (check_watched(instance, stretch.stability, stretch.rotation) == REFUSED)
         return REFUSED;
+    if (now->estimates)
+        go_along(now, &companion, &stretch.state);
     now->state = stretch.state;
     now->proposed = stretch.proposed;
     now->controls = end;
@@ -277,6 +330,8 @@ static enum verdict take_step(struct instance *instance, double point, double st
     now->rated = 0;
     enum verdict verdict = count_substeps(instance, stretch.substeps);
     verdict = worse(verdict, warn_of_the_step(instance));
+    if (now->estimates)
+        verdict = worse(verdict, warn_of_the_error(instance));
     verdict = worse(verdict, instance_warn_of_held_inputs(instance, &inquiry.start));
     return worse(verdict, instance_warn_of_held_inputs(instance, &end));
 }

@@ -28,6 +28,9 @@ enum verdict instance_observe_motion(struct instance *instance)
     if (check_finite(instance, MOTION, MOTION_COUNT) == REFUSED)
         return REFUSED;
     instance_spread(reals, s, STATES, STATE_COUNT);
+    const struct error error = instance_error(now);
+    reals[V_ERROR_POSITION] = error.position;
+    reals[V_ERROR_HEADING] = error.heading;
     now->motion_unread = false;
     return FINE;
 }
@@ -136,6 +139,12 @@ static const char *broken_rule(enum rule rule, double value)
     case DRAG_AREA_NUMBER_RULE:
         return 0.0 <= value && value <= DRAG_AREA_COUNT ? NULL
                                                         : "must be 0 (as drag_area says) or one of " DRAG_AREA_LIST;
+    case ERROR_ESTIMATE_RULE:
+        return 1.0 <= value && value <= ERROR_ESTIMATE_COUNT ? NULL : "must be one of " ERROR_ESTIMATE_LIST;
+    case ERROR_ESTIMATE_NUMBER_RULE:
+        return 0.0 <= value && value <= ERROR_ESTIMATE_COUNT
+                   ? NULL
+                   : "must be 0 (as error_estimate says) or one of " ERROR_ESTIMATE_LIST;
     case ANY:
         break;
     }
@@ -234,6 +243,10 @@ static enum verdict check_integer(struct instance *instance, const struct variab
         return instance_say(instance, REFUSED, "%s = %i: must not be set in state '%s' (%s)", variable->name,
                             (long long)value, PHASE_NAMES[instance->now.phase], variable->role);
     const char *why = broken_rule(variable->rule, (double)value);
+    const unsigned reference = (unsigned)(variable - VARIABLES);
+    if ((reference == V_ERROR_ESTIMATE || reference == V_ERROR_ESTIMATE_NUMBER) && value == ON &&
+        instance->now.use == MODEL_EXCHANGE)
+        why = "must be off in model exchange: there the error is that of the importer's solver; use co-simulation";
     return why ? instance_say(instance, REFUSED, "%s = %i: %s", variable->name, (long long)value, why) : FINE;
 }
 

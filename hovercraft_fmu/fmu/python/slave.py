@@ -5,6 +5,7 @@ from typing import Any, NoReturn
 
 from ...model.craft import Craft, check_parameter
 from ...model.dynamics import Controls, State, saturate
+from ...model.error_estimate import ON, Companion, accompany, check_error_estimate, estimated_error, is_lost
 from ...model.integrators import Integrator, integrator
 from ...model.observation import observe_action, observe_motion
 from ...model.subcycling import (
@@ -20,6 +21,8 @@ from ..interface import (
     BY_NAME,
     COUNTER_STOPPED,
     CRAFT_PARAMETERS,
+    ERROR_LOST,
+    ERRORS,
     HELD,
     HOVERCRAFT,
     INPUT_HELD,
@@ -38,12 +41,15 @@ from .wrapper import Fmi2Status
 
 THRUST, PORT, STARBOARD, WIND_X, WIND_Y = (BY_NAME[name].reference for name in INPUTS)
 STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
-MOTION_REFERENCES = STATE_REFERENCES + tuple(BY_NAME[name].reference for name in MOTION)
+MOTION_REFERENCES = tuple(BY_NAME[name].reference for name in (*STATES, *MOTION))
+ERROR_REFERENCES = tuple(BY_NAME[name].reference for name in ERRORS)
+NO_ERROR = dict.fromkeys(ERROR_REFERENCES, 0.0)
 ON_DEMAND = (*ACTION, *WATCHED, "projected_area")
 ON_DEMAND_REFERENCES = tuple(BY_NAME[name].reference for name in ON_DEMAND)
 CRAFT_VARIABLES = tuple(BY_NAME[name] for name in CRAFT_PARAMETERS)
 STEP_SIZE = BY_NAME["step_size"].reference
 INTEGRATOR = BY_NAME["integrator"].reference
+ERROR_ESTIMATE = BY_NAME["error_estimate"].reference
 SUBSTEPS = BY_NAME["substeps"].reference
 WARNED = BY_NAME["warnings"].reference
 TOLERANCE = BY_NAME["tolerance"].reference
@@ -64,6 +70,8 @@ class HovercraftSlave(Slave):
         self._settings = Settings()
         self._proposed = 0.0  # the next step of the adaptive method
         self._stability = self._rotation = 0.0  # the largest of a sub-step so far
+        self._companion: Companion | None = None  # where the error is estimated
+        self._way = 0.0  # m, so far, from communication point to communication point
 
     # ---- a step
 
@@ -78,6 +86,8 @@ class HovercraftSlave(Slave):
         state, n, stability, rotation, proposed = stretch
         if not (stability < math.inf and rotation < math.inf):
             self._refuse_watched(stability, rotation)
+        if self._companion:
+            self._accompany(self._companion, controls, craft, step_size, state)
         self._state, self._proposed = state, proposed
         self._controls, self._craft, self._tuned = controls, craft, False
         self._integers[SUBSTEPS] += n
@@ -92,6 +102,8 @@ class HovercraftSlave(Slave):
             self._warn_of_stability(stability, method)
         if rotation > method.rotation_limit:
             self._warn_of_rotation(rotation, method)
+        if self._companion:
+            self._warn_of_error(method)
         thrust, port, starboard, _, _ = controls
         if not (craft.thrust_min <= thrust <= craft.thrust_max and 0.0 <= port <= 1.0 and 0.0 <= starboard <= 1.0):
             self._warn_of_held_inputs()
@@ -111,6 +123,28 @@ class HovercraftSlave(Slave):
             f"rotation_per_substep = {rotation:.4g} rad: must not pass {method.rotation_limit} rad; set a "
             f"step_size below {step:.3g} s, or the integrator adaptive",
         )
+
+    def _accompany(self, companion: Companion, controls: Controls, craft: Craft, step_size: float, made: State) -> None:
+        """Where the craft goes with its companion."""
+        dx, dy = made.x - self._state.x, made.y - self._state.y
+        self._companion = accompany(companion, controls, craft, step_size, self._settings)
+        self._way += math.sqrt(dx * dx + dy * dy)
+
+    def _error(self) -> tuple[float, float]:
+        """m, rad: by its companion, at the communication point; 0 where it has none."""
+        if not self._companion:
+            return 0.0, 0.0
+        return estimated_error(self._state, self._companion, self._craft, self._settings.integrator)
+
+    def _warn_of_error(self, method: Integrator) -> None:
+        position = self._error()[0]
+        if is_lost(position, self._way, self._integers[SUBSTEPS]):
+            setting = "step_size" if method.integrate else "tolerance"
+            self._warn(
+                ERROR_LOST,
+                f"error.position = {position:.4g} m after a way of {self._way:.4g} m: is no estimate any more, the "
+                f"answers are lost; set a smaller {setting}",
+            )
 
     def _stop_counter(self) -> None:
         self._integers[SUBSTEPS] = SUBSTEPS_MAX
@@ -157,6 +191,8 @@ class HovercraftSlave(Slave):
             integrator(int(value))
         elif variable.reference == TOLERANCE:
             check_tolerance(value)
+        elif variable.reference == ERROR_ESTIMATE:
+            check_error_estimate(int(value))
         elif variable.chooses:
             self.model.check_choice(variable.chooses, int(value))
 
@@ -185,6 +221,8 @@ class HovercraftSlave(Slave):
         self._take_up_settings()
         self._controls = self._make_controls()
         self._state = State(*(self._given[reference] for reference in STATE_REFERENCES))
+        self._companion = Companion(self._state) if self._chosen("error_estimate") == ON else None
+        self._way = 0.0
         self._tuned = False
         self._stale = True
 
@@ -192,7 +230,8 @@ class HovercraftSlave(Slave):
         motion = observe_motion(self._state)
         if not math.isfinite(motion[-1]):  # the speed overflows first
             refuse_non_finite(MOTION, motion)
-        return dict(zip(MOTION_REFERENCES, self._state + motion))  # noqa: B905 - of one length
+        seen = dict(zip(MOTION_REFERENCES, self._state + motion))  # noqa: B905 - of one length
+        return seen | (dict(zip(ERROR_REFERENCES, self._error(), strict=True)) if self._companion else NO_ERROR)
 
     def _observe_on_demand(self) -> dict[int, float]:
         action = observe_action(self._state, self._controls, self._craft)
@@ -210,6 +249,7 @@ class HovercraftSlave(Slave):
             "stability": self._stability,
             "rotation": self._rotation,
             "proposed": self._proposed,
+            "companion": self._companion and [*self._companion.state, self._companion.proposed, self._way],
         }
 
     def _set_own_state(self, state: dict[str, Any]) -> None:
@@ -220,3 +260,7 @@ class HovercraftSlave(Slave):
         if self._started():  # else the start values are taken up, and refused, later
             self._take_up_settings()
         self._stability, self._rotation, self._proposed = state["stability"], state["rotation"], state["proposed"]
+        self._companion, self._way = None, 0.0
+        if state["companion"]:
+            *pose, proposed, self._way = state["companion"]
+            self._companion = Companion(State(*pose), proposed)
