@@ -1,12 +1,10 @@
 """Sweeps: a run of one has the bits of `simulate`, whoever makes it, when and beside what."""
 
-import contextlib
 import csv
 import itertools
 import json
 import math
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -25,7 +23,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from hovercraft_fmu import simulate
+from hovercraft_fmu import SimulationError, simulate
 from hovercraft_fmu.fmu.interface import STEP_UNSTABLE
 from hovercraft_fmu.model.dynamics import Controls
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator
@@ -33,13 +31,14 @@ from hovercraft_fmu.model.subcycling import Settings, meant_step, substeps
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Value
 from hovercraft_fmu.studies import carry_out, sweep_costs
-from hovercraft_fmu.sweep import STUDIES, load, read_study, sweep
+from hovercraft_fmu.sweep import STUDIES, cluster, load, read_study, sweep
 from hovercraft_fmu.sweep import runner as runner_module
 from hovercraft_fmu.sweep.charts import plot_sweep
 from hovercraft_fmu.sweep.engines import Plan
 from hovercraft_fmu.sweep.quantities import FORMULAS, OBSERVED
 from hovercraft_fmu.sweep.study import Factor
 from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
+from hovercraft_fmu.sweep.work import DRIVERS, Job, make_chunk
 from tests.conftest import FMI_2, ROOT
 from tests.shell import Shell
 
@@ -461,14 +460,15 @@ def test_a_sweep_goes_on_only_as_it_began(fmu: Path, native_fmu: Path, tmp_path:
 KILLED = """
 import json, sys
 from hovercraft_fmu.sweep import sweep
-sweep(json.loads(sys.argv[1]), sys.argv[2], workers=1, output=sys.argv[3])
+if __name__ == "__main__":
+    sweep(json.loads(sys.argv[1]), sys.argv[2], workers=2, output=sys.argv[3])
 """
 
 
 def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> None:
     study = but(
         sweep={"mass": RANGE},
-        sampling={"method": "latin_hypercube", "runs": 96, "seed": 1},
+        sampling={"method": "latin_hypercube", "runs": 32, "seed": 1},
         keep={"distance": True, "trajectory": {"every": 30.0, "of": ["pose.x", "pose.y"]}},
     )
     there = tmp_path / "killed" / "runs"
@@ -477,12 +477,16 @@ def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> 
     while len(list(there.glob("*.parquet"))) < 2:
         assert process.poll() is None
         time.sleep(0.005)
+    workers = psutil.Process(process.pid).children()
+    assert len(workers) >= 2
     process.kill()
     process.wait()
+    psutil.wait_procs(workers, timeout=60)
+    assert not any(each.is_running() for each in workers)  # they end with the process that started them
     made = len(list(there.glob("*.parquet")))
     assert 2 <= made < 32
     kept = {path: path.stat().st_mtime_ns for path in there.glob("*.parquet")}
-    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 96 - 3 * made
+    assert sweep(study, fmu, workers=1, output=tmp_path / "killed").new == 32 - made
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
     sweep(study, fmu, workers=1, output=tmp_path / "whole")
     for what in ("runs", "trajectories"):
@@ -543,7 +547,7 @@ def test_the_bits_do_not_depend_on_who_makes_the_runs(each_fmu: Path, tmp_path: 
 
 
 def _drivers() -> int:
-    return len(runner_module.DRIVERS)
+    return len(DRIVERS)
 
 
 @pytest.mark.once
@@ -556,26 +560,35 @@ def test_two_workers_of_this_machine_give_the_bits_of_one(tmp_path: Path) -> Non
 
 
 @pytest.mark.once
-def test_nothing_listens_to_other_machines(fmu: Path, tmp_path: Path) -> None:
-    """Nor does a port that is taken matter: dask's own is here."""
-    addresses: set[str] = set()
+def test_nothing_listens_and_no_worker_is_left(native_fmu: Path, tmp_path: Path) -> None:
+    def listening() -> list[str]:
+        connections = [one for each in (me, *me.children(recursive=True)) for one in each.net_connections()]
+        return [one.laddr.ip for one in connections if one.status == "LISTEN"]
 
-    def look(_: int) -> None:
-        processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
-        found = [one.laddr.ip for each in processes for one in each.net_connections() if one.status == "LISTEN"]
-        addresses.update(found)
+    me, seen = psutil.Process(), []
+    before = {child.pid for child in me.children()}, listening()
+    sweep(MASSES, native_fmu, workers=2, output=tmp_path, tell=lambda _: seen.append(listening()))
+    assert seen == [before[1]] * 7
+    assert len({child.pid for child in me.children()} - before[0]) <= 1  # Python's own tracker of resources
 
-    with socket.socket() as taken:
-        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        with contextlib.suppress(OSError):  # or another program has it
-            taken.bind(("127.0.0.1", 8787))
-            taken.listen()
-        sweep(MASSES, fmu, workers=2, output=tmp_path, tell=look)
-    assert addresses == {"127.0.0.1"}
+
+@pytest.mark.once
+def test_a_worker_that_is_killed_is_an_error_and_what_was_made_stays(native_fmu: Path, tmp_path: Path) -> None:
+    def kill(runs: int) -> None:
+        if runs == 1:
+            victim = next(each for each in psutil.Process().children() if "spawn_main" in " ".join(each.cmdline()))
+            victim.kill()
+            victim.wait()
+
+    study = but(sweep={"mass": RANGE}, sampling={"method": "latin_hypercube", "runs": 32, "seed": 1})
+    with pytest.raises(SimulationError, match="a worker is gone: its process ended"):
+        sweep(study, native_fmu, workers=2, output=tmp_path, tell=kill)
+    made = len(list((tmp_path / "runs").glob("*.parquet")))
+    assert sweep(study, native_fmu, workers=1, output=tmp_path).new == 32 - made < 32
 
 
 def test_a_scheduler_that_is_not_there(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner_module, "CONNECT", 0.5)
+    monkeypatch.setattr(cluster, "CONNECT", 0.5)
     with pytest.raises(OSError, match=r"127\.0\.0\.1:1"):
         sweep(MASSES, fmu, scheduler="tcp://127.0.0.1:1", output=tmp_path)
     with pytest.raises(ValueError, match="scheduler = 'nonsense': must be an address as tcp://"):
@@ -603,9 +616,9 @@ def test_bad_arguments(tmp_path: Path, fmu: Path) -> None:
 def test_a_worker_with_another_version_is_refused() -> None:
     study = read_study(MASSES)
     plan = Plan(study.run, study.keep, timeline(study.run, study.keep))
-    job = runner_module.Job("any", "9.9", plan, (), None)
+    job = Job("any", "9.9", plan, (), None, {})
     with pytest.raises(ValueError, match=r"a worker has hovercraft-fmu .*: must be 9\.9"):
-        runner_module.make_chunk(job, 0, np.arange(1), {})
+        make_chunk(job, 0, np.arange(1), {})
 
 
 # ---- pictures, the command

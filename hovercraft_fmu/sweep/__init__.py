@@ -1,12 +1,32 @@
 """Sweeps: many runs of one FMU, from a study file to Parquet."""
 
-try:
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
     from .runner import Outcome, sweep
     from .store import load
     from .study import STUDIES, Study, read_study
-except ModuleNotFoundError as error:
-    raise ModuleNotFoundError(
-        f"sweeps need {error.name}, which is not installed: pip install 'hovercraft-fmu[sweep]'"
-    ) from error
+
+_HOMES = {
+    "STUDIES": "study",
+    "Outcome": "runner",
+    "Study": "study",
+    "load": "store",
+    "read_study": "study",
+    "sweep": "runner",
+}
+"""Where each name is from: a worker needs less than the one who starts it."""
 
 __all__ = ["STUDIES", "Outcome", "Study", "load", "read_study", "sweep"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"sweeps need {error.name}, which is not installed: pip install 'hovercraft-fmu[sweep]'"
+        ) from error

@@ -25,7 +25,7 @@ from ..host.fleet import Array, Crafts, advance_fleet, observe_fleet, refusals
 from ..model.dynamics import Controls, State
 from ..model.subcycling import NonFiniteError, Settings, meant_step
 from .engines import SETTINGS, Plan, Ran, empty, settings_of
-from .study import Samples
+from .quantities import Samples
 from .timeline import Leg, merged
 
 

@@ -19,8 +19,7 @@ from ..model.dynamics import Controls
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..simulation import Run
-from .quantities import Keep, Record
-from .study import Samples
+from .quantities import Keep, Record, Samples
 from .timeline import Timeline, merged
 
 

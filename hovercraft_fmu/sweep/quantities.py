@@ -15,6 +15,8 @@ Record: TypeAlias = NDArray[np.float64]
 """Shape (runs, points, quantities): what was read at the communication points that matter."""
 Values: TypeAlias = NDArray[np.float64]
 """Shape (runs, points)."""
+Samples: TypeAlias = Mapping[str, NDArray[Any]]
+"""Swept parameter -> its values, one a run."""
 
 OBSERVED = (*STATES, *MOTION, *ACTION, *WATCHED)
 """What is read from the FMU, or worked out of the bare model."""

@@ -1,39 +1,29 @@
 """Makes a sweep: chunk by chunk, here or on a cluster of dask's, into the store."""
 
 import hashlib
-import itertools
-import logging
 import os
 import platform
-import signal
-import tempfile
-import threading
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Mapping
+from contextlib import closing
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
-import distributed
 import numpy as np
-import pyarrow as pa
-import scipy
-from dask.system import CPU_COUNT
-from distributed.comm.addressing import get_address_host_port
 
 from .._version import __version__
 from ..building import default_fmu
 from ..fmu.interface import HOVERCRAFT
-from ..host import SimulationError, read_description
+from ..host import read_description
 from ..simulation.fmu_run import own_starts
-from .batch import run_batch
-from .engines import SETTINGS, Driver, Plan
-from .quantities import quantity_function, row_columns
-from .store import Store, runs_table, trajectories_table
-from .study import Samples, Study, read_study
+from .engines import SETTINGS, Plan
+from .store import Store
+from .study import Study, read_study
 from .timeline import timeline
+from .work import Job, Made
+from .workers import Todo, made_beside, made_here
 
 Tell: TypeAlias = Callable[[int], None]
 """Called with the number of runs that are done, now and then."""
@@ -48,12 +38,6 @@ MOST_VALUES = 2**22
 """That a chunk reads (32 MB): so memory stays bounded where whole trajectories are read."""
 MOST_SUBSTEPS = 10**6
 """Of a chunk of runs of the FMU: a second of the Python FMU's."""
-CONNECT = 10
-"""s, to reach a scheduler."""
-LOOPBACK = "127.0.0.1:0"
-"""Any free port, of this machine alone."""
-AHEAD = 2
-"""Chunks a worker that are on their way."""
 
 
 class Outcome(NamedTuple):
@@ -69,27 +53,6 @@ class Outcome(NamedTuple):
     """Of the new ones: rows whose column `warnings` is not 0."""
     error: str | None
     """The first of the errors, with the number of its run."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """What a worker is sent once."""
-
-    sweep: str
-    """A name of its own for every call of `sweep`."""
-    version: str
-    plan: Plan
-    swept: tuple[str, ...]
-    fmu: bytes | None
-    """The content of the FMU; None: the batch."""
-
-
-class Made(NamedTuple):
-    """A chunk, made."""
-
-    chunk: int
-    runs: pa.Table
-    trajectories: pa.Table | None
 
 
 def sweep(
@@ -134,22 +97,31 @@ def sweep(
     first: tuple[int, str] | None = None
     tell(there)
     if there < chosen.runs:
-        with _workers(workers, scheduler) as client:
-            for made in _here(job, todo) if client is None else _on(client, job, todo):
-                store.write(*made)
-                new += made.runs.num_rows
-                errors = _errors(made.runs)
-                failed += len(errors)
-                warned += int(np.count_nonzero(made.runs["warnings"].fill_null(0)))
-                first = min([*errors[:1], *([first] if first else [])], default=None)
+        with closing(_chunks(job, todo, workers, scheduler)) as chunks_made:
+            for made in chunks_made:
+                store.write(made.chunk, made.files)
+                new, failed, warned = new + made.runs, failed + made.failed, warned + made.warned
+                first = min(filter(None, (first, made.error)), default=None)
                 tell(there + new)
     error = "run {}: {}".format(*first) if first else None
     return Outcome(store.folder, chosen.runs, new, failed, warned, error)
 
 
-def _errors(runs: pa.Table) -> list[tuple[int, str]]:
-    rows = zip(runs["run"].to_pylist(), runs["error"].to_pylist(), strict=True)
-    return [(run, error) for run, error in rows if error is not None]
+def _chunks(job: Job, todo: Todo, workers: int | None, scheduler: str | None) -> Generator[Made, None, None]:
+    """Made where they are to be made."""
+    if scheduler is None:
+        count = workers or _processors()
+        return made_here(job, todo) if count == 1 else made_beside(job, todo, count)
+    if workers is not None:
+        raise ValueError(f"workers = {workers}: must not be given with a scheduler, which has its own")
+    from .cluster import made_on
+
+    return made_on(scheduler, job, todo)
+
+
+def _processors() -> int:
+    """That this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _numbers(chunk: int, size: int, runs: int) -> Any:
@@ -182,12 +154,12 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
         "swept": list(swept),
         "kept": list(study.keep.columns),
         "versions": {
-            "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__,
-            "pyarrow": pa.__version__, "dask": metadata.version("dask"),
+            "python": platform.python_version(), "numpy": metadata.version("numpy"), "scipy": metadata.version("scipy"),
+            "pyarrow": metadata.version("pyarrow"), "dask": metadata.version("dask"),
         },
         "machine": f"{platform.system()} {platform.machine()}",
     }  # fmt: skip
-    return Job(uuid.uuid4().hex, __version__, plan, swept, content), about
+    return Job(uuid.uuid4().hex, __version__, plan, swept, content, about), about
 
 
 def _chunk(plan: Plan, runs: int, engine: str) -> int:
@@ -208,124 +180,3 @@ def _content(study: Study, path: Path) -> tuple[bytes, dict[str, float | int]]:
         if name not in has:
             raise ValueError(f"{path}: must have the variable {name}")
     return path.read_bytes(), own_starts(description)
-
-
-# ---- on a worker
-
-DRIVERS: dict[tuple[str, int], Driver] = {}
-"""(sweep, thread) -> its instance: it is used again from chunk to chunk."""
-
-
-def make_chunk(job: Job, chunk: int, numbers: Any, samples: Samples) -> Made:
-    """Make the runs of a chunk. Raises ValueError on a worker with another version of this package."""
-    if job.version != __version__:
-        raise ValueError(f"a worker has hovercraft-fmu {__version__}: must be {job.version}, that of the sweep")
-    plan = job.plan
-    ran = run_batch(plan, samples) if job.fmu is None else _driver(job).run(samples)
-    columns = row_columns(plan.keep, ran.record, plan.timeline.times)
-    runs = runs_table(numbers, samples, columns, ran.warnings, ran.errors)
-    if not plan.keep.trajectory:
-        return Made(chunk, runs, None)
-    good = np.array([error is None for error in ran.errors])
-    values = quantity_function(plan.keep, ran.record)
-    points = plan.timeline.sampled
-    kept = {name: values(name)[np.ix_(good, points)] for name in plan.keep.trajectory}
-    return Made(chunk, runs, trajectories_table(numbers[good], plan.timeline.times[points], kept))
-
-
-def _driver(job: Job) -> Driver:
-    key = job.sweep, threading.get_ident()
-    if key not in DRIVERS:
-        assert job.fmu is not None
-        DRIVERS[key] = Driver(job.plan, job.fmu, job.swept)
-    return DRIVERS[key]
-
-
-def release(sweep_name: str) -> None:
-    """Free the instances of a sweep that is over."""
-    for key in [key for key in DRIVERS if key[0] == sweep_name]:
-        DRIVERS.pop(key).close()
-
-
-# ---- where the workers are
-
-Todo: TypeAlias = Iterable[tuple[int, Any, Samples]]
-
-
-@contextmanager
-def _workers(workers: int | None, scheduler: str | None) -> Iterator[Any]:
-    """A client of dask's, or None: this process."""
-    if scheduler is None and (workers or CPU_COUNT) == 1:
-        yield None
-        return
-    if scheduler is not None:
-        if workers is not None:
-            raise ValueError(f"workers = {workers}: must not be given with a scheduler, which has its own")
-        with _connected(scheduler) as client:
-            if not client.nthreads():
-                raise ValueError(f"scheduler = {scheduler!r}: must have a worker")
-            yield client
-        return
-    with (
-        # a worker that is ended in the middle of a chunk leaves the FMU's files: they go with this folder
-        tempfile.TemporaryDirectory(prefix="hovercraft_sweep_", ignore_cleanup_errors=True) as folder,
-        _local_cluster(workers or CPU_COUNT, folder) as cluster,
-        distributed.Client(cluster, set_as_default=False) as client,
-    ):
-        yield client
-
-
-def _connected(scheduler: str) -> Any:
-    try:
-        get_address_host_port(scheduler)  # a client that was made with a bad one lingers, and then complains
-    except ValueError as error:
-        raise ValueError(f"scheduler = {scheduler!r}: must be an address as tcp://10.0.0.1:8786; {error}") from error
-    return distributed.Client(scheduler, set_as_default=False, timeout=CONNECT)
-
-
-def _local_cluster(workers: int, folder: str) -> Any:
-    """Processes on this machine, which leave a Ctrl-C to this one: what is ignored when a process starts stays so."""
-    here = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if here else None
-    try:
-        return distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1", memory_limit=None,
-            # dask's pages cannot be switched off, and without an address they are on every network
-            worker_dashboard_address=LOOPBACK, scheduler_kwargs={"dashboard": False, "dashboard_address": LOOPBACK},
-            silence_logs=logging.CRITICAL, local_directory=folder, env={"TMPDIR": folder},
-        )  # fmt: skip
-    finally:
-        if here:
-            signal.signal(signal.SIGINT, before)
-
-
-def _here(job: Job, todo: Todo) -> Iterator[Made]:
-    try:
-        for part in todo:
-            yield make_chunk(job, *part)
-    finally:
-        release(job.sweep)
-
-
-def _on(client: Any, job: Job, todo: Todo) -> Iterator[Made]:
-    """Chunks as they are made, a few on their way for each worker: memory here and there stays bounded."""
-    everywhere = client.scatter(job, broadcast=True)
-    parts = iter(todo)
-
-    def submitted(count: int) -> list[Any]:
-        few = itertools.islice(parts, count)
-        return [client.submit(make_chunk, everywhere, *part, pure=False) for part in few]
-
-    ahead = AHEAD * max(1, sum(client.nthreads().values()))
-    waiting = distributed.as_completed(submitted(ahead), loop=client.loop)
-    try:
-        for future in waiting:
-            yield future.result()
-            future.release()
-            for new in submitted(1):
-                waiting.add(new)
-    except (distributed.KilledWorker, distributed.client.FutureCancelledError) as error:
-        raise SimulationError(f"the workers are gone: {error}") from error
-    finally:
-        client.cancel(list(waiting.futures))
-        client.run(release, job.sweep)

@@ -15,7 +15,7 @@ from .quantities import display
 
 RUNS, TRAJECTORIES = "runs", "trajectories"
 KEY = b"hovercraft_fmu"
-"""Of the metadata: JSON; see `Store`."""
+"""Of the metadata: JSON; see `packed`."""
 SAME = ("study", "engine", "fmu_sha256", "hovercraft_fmu", "runs", "chunk")
 """What must be the same where a sweep goes on; the rest of the metadata may differ."""
 
@@ -28,7 +28,7 @@ class Store:
     """
 
     def __init__(self, folder: Path, metadata: Mapping[str, Any]) -> None:
-        self.folder, self._metadata = folder, metadata
+        self.folder = folder
         for path in self._files():
             _check_same(folder, metadata_of(path), metadata)
 
@@ -40,19 +40,18 @@ class Store:
     def _files(self) -> list[Path]:
         return sorted((self.folder / RUNS).glob("*.parquet"))
 
-    def write(self, chunk: int, runs: pa.Table, trajectories: pa.Table | None) -> None:
-        """Write a chunk. Its runs come last: where they are, all of it is."""
-        if trajectories is not None:
-            self._write(TRAJECTORIES, chunk, trajectories)
-        self._write(RUNS, chunk, runs)
+    def write(self, chunk: int, files: Mapping[str, bytes]) -> None:
+        """Write the files of a chunk; see `packed`. Its runs come last: where they are, all of it is."""
+        for what in sorted(files, key=lambda what: what == RUNS):
+            self._write(what, chunk, files[what])
 
-    def _write(self, what: str, chunk: int, table: pa.Table) -> None:
+    def _write(self, what: str, chunk: int, content: bytes) -> None:
         path = self.folder / what / f"{chunk:05}.parquet"
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = path.with_name(f".{path.name}.{os.getpid()}")
         try:
             with unfinished.open("wb") as file:
-                pq.write_table(table.replace_schema_metadata({KEY: json.dumps(self._metadata)}), file)
+                file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
             unfinished.replace(path)
@@ -140,6 +139,14 @@ def extremes(folder: str | os.PathLike[str]) -> list[Extreme]:
 
 
 # ---- tables
+
+
+def packed(table: pa.Table, metadata: Mapping[str, Any]) -> bytes:
+    """The content of a Parquet file that says where its rows come from."""
+    into = pa.BufferOutputStream()
+    pq.write_table(table.replace_schema_metadata({KEY: json.dumps(metadata)}), into)
+    content: bytes = into.getvalue().to_pybytes()
+    return content
 
 
 def runs_table(

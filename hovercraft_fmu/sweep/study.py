@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import isclose, prod
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,6 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-Samples: TypeAlias = Mapping[str, NDArray[Any]]
-"""Swept parameter -> its values, one a run."""
 
 SHIPPED = Path(__file__).parent / "studies"
 STUDIES = tuple(sorted(path.stem for path in SHIPPED.glob("*.toml")))

@@ -1,0 +1,123 @@
+"""Where chunks are made: in this process, or in others of this machine."""
+
+import signal
+import tempfile
+import threading
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
+from itertools import islice
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from typing import Any, TypeAlias
+
+from ..host import SimulationError
+from .quantities import Samples
+from .work import Job, Made, make_chunk, release
+
+Part: TypeAlias = tuple[int, Any, Samples]
+"""Number of a chunk, numbers of its runs, what is swept."""
+Todo: TypeAlias = Iterable[Part]
+
+
+def made_here(job: Job, todo: Todo) -> Generator[Made, None, None]:
+    """In this process."""
+    try:
+        for part in todo:
+            yield make_chunk(job, *part)
+    finally:
+        release(job.sweep)
+
+
+def made_beside(job: Job, todo: Todo, workers: int) -> Generator[Made, None, None]:
+    """In processes of their own, as they are made; each has one chunk, so that memory here and there stays bounded.
+
+    Raises SimulationError where a process ended.
+    """
+    parts = iter(todo)
+    first = list(islice(parts, workers))
+    with _processes(len(first)) as ends:
+        try:
+            for end, part in zip(ends, first, strict=True):
+                end.send(job)
+                end.send(part)
+            yield from _received(list(ends), parts)
+        except (EOFError, ConnectionError) as error:
+            raise SimulationError("a worker is gone: its process ended") from error
+
+
+def _received(busy: list[Connection], parts: Iterator[Part]) -> Iterator[Made]:
+    """What the workers send, who have a part each, and then the next one."""
+    while busy:
+        ready = wait(busy)
+        for end in [each for each in busy if each in ready]:
+            made = end.recv()
+            following = next(parts, None)
+            if following is None:
+                busy.remove(end)
+            else:
+                end.send(following)
+            if isinstance(made, Exception):
+                raise made
+            yield made
+
+
+@contextmanager
+def _processes(count: int) -> Iterator[list[Connection]]:
+    """Workers, each at the other end of one of these; they end with the context, or with this process."""
+    context = get_context("spawn")
+    # a worker that is ended in the middle of a chunk leaves the FMU's files: they go with this folder
+    with tempfile.TemporaryDirectory(prefix="hovercraft_sweep_", ignore_cleanup_errors=True) as folder:
+        pairs = [context.Pipe() for _ in range(count)]
+        processes = [context.Process(target=_work, args=(there, folder), daemon=True) for _, there in pairs]
+        ends = [here for here, _ in pairs]
+        try:
+            with _no_interrupts():  # what is ignored when a process starts stays so
+                for process in processes:
+                    process.start()
+            for _, there in pairs:
+                there.close()
+            yield ends
+        except BaseException:
+            for process in processes:
+                process.kill()
+            raise
+        finally:
+            for end in ends:
+                end.close()
+            for process in processes:
+                process.join()
+
+
+@contextmanager
+def _no_interrupts() -> Iterator[None]:
+    """A Ctrl-C is for this process, and not now."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _work(end: Connection, folder: str) -> None:
+    """A worker: it is sent a job and then part after part, until the other end is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tempfile.tempdir = folder
+    try:
+        job = end.recv()
+        try:
+            while True:
+                end.send(_made(job, end.recv()))
+        finally:
+            release(job.sweep)
+    except (EOFError, OSError):
+        pass
+
+
+def _made(job: Job, part: Part) -> Made | Exception:
+    try:
+        return make_chunk(job, *part)
+    except Exception as error:
+        return error
