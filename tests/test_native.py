@@ -586,7 +586,7 @@ def sanitized(path: Path, fmu: Path, flavour: Flavour, folder: Path) -> Path:
     for name, content in files.items():
         if name.startswith("sources/"):
             (folder / Path(name).name).write_bytes(content)
-    command = [c_compiler(), "-std=c11", "-O1", "-ffp-contract=off", *SANITIZERS["address"], "-shared", "-fPIC"]
+    command = [c_compiler(), "-std=c11", "-ffp-contract=off", *SANITIZERS["address"], "-shared", "-fPIC"]
     headers = ("-I", str(C_FOLDER / f"fmi{flavour.fmi}"), f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX")
     subprocess.run([*command, *headers, flavour.unit, "-o", "x.so"], cwd=folder, check=True)
     files[f"binaries/{binary('x86_64-linux', flavour)}"] = (folder / "x.so").read_bytes()
