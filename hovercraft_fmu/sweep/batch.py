@@ -45,13 +45,16 @@ def run_batch(plan: Plan, samples: Samples) -> Ran:
 
 def _groups(plan: Plan, samples: Samples) -> Iterator[tuple[Settings, NDArray[np.int64]]]:
     """The runs with the same settings."""
-    count = len(next(iter(samples.values())))
-    columns = [np.broadcast_to(samples.get(name, plan.run.value(name)), count).tolist() for name in SETTINGS]
+    shared = {name: plan.run.value(name) for name in SETTINGS}
+    swept = {name: samples[name].tolist() for name in SETTINGS if name in samples}
+    if not swept:
+        yield settings_of(shared), np.arange(len(next(iter(samples.values()))))
+        return
     groups: dict[tuple[float | int, ...], list[int]] = {}
-    for i, key in enumerate(zip(*columns, strict=True)):
+    for i, key in enumerate(zip(*swept.values(), strict=True)):
         groups.setdefault(key, []).append(i)
     for key, group in groups.items():
-        yield settings_of(dict(zip(SETTINGS, key, strict=True))), np.array(group)
+        yield settings_of(shared | dict(zip(swept, key, strict=True))), np.array(group)
 
 
 def _parameters(plan: Plan, samples: Samples) -> dict[str, Array]:

@@ -144,7 +144,8 @@ def extremes(folder: str | os.PathLike[str]) -> list[Extreme]:
 def packed(table: pa.Table, metadata: Mapping[str, Any]) -> bytes:
     """The content of a Parquet file that says where its rows come from."""
     into = pa.BufferOutputStream()
-    pq.write_table(table.replace_schema_metadata({KEY: json.dumps(metadata)}), into)
+    # a dictionary of numbers that are all different takes time and room
+    pq.write_table(table.replace_schema_metadata({KEY: json.dumps(metadata)}), into, use_dictionary=False)
     content: bytes = into.getvalue().to_pybytes()
     return content
 
