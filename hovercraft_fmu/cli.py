@@ -176,6 +176,7 @@ def of_an_fmu(command: Callable[..., None]) -> Callable[..., None]:
     help="Animate a second run with these start values beside it: integrator=rk4,step_size=0.1. (--output and --plot "
     "are of the first.)",
 )  # fmt: skip
+@click.option("--error", is_flag=True, help="Have the FMU tell how far it is off; three times the cost.")
 @click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
 def simulate_command(
     fmu: Path | None,
@@ -187,6 +188,7 @@ def simulate_command(
     plot: Path | None,
     animation: Path | None,
     against: str | None,
+    error: bool,
     list_scenes: bool,
     **options: Any,
 ) -> None:
@@ -202,7 +204,7 @@ def simulate_command(
         raise click.UsageError("--scene and --input: must not be given together")
     if against is not None and not animation:
         raise click.UsageError("--against: must be given together with --animate")
-    start_values = _settings(settings)
+    start_values = _settings((*settings, "error_estimate=on") if error else settings)
     inputs: Inputs = log if log else scene or "launch"
     others = [{**start_values, **_settings(against.split(","), "--against")}] if against is not None else []
     if plot:
@@ -614,6 +616,8 @@ def _print_result(result: "Result") -> None:
         "end heading": f"{math.degrees(result['pose.heading'][-1]):.2f} deg",
         "end speed": f"{result['speed'][-1]:.4f} m/s",
     }
+    if result.is_estimated:
+        rows["error, as told"] = result.error_in_words
     _print_rows(f"{run.title}: {run.method}", rows)
     for warning in result.warnings:
         OUTPUT.print(f"warning: {warning}")

@@ -18,7 +18,10 @@ from hovercraft_fmu.model.error_estimate import LARGEST, Companion, accompany, e
 from hovercraft_fmu.model.integrators import INTEGRATORS, Integrator, integrator_number
 from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.simulation import Value, simulate
+from hovercraft_fmu.view.animation import Track
 from tests.lowlevel import another, count, get, kept, one, put, reference, start
+from tests.shell import Shell
 
 METHODS = {method.name: method for method in INTEGRATORS}
 ON = 2
@@ -269,3 +272,41 @@ def test_an_fmu_that_starts_with_it_is_for_steps_alone(flavour: Any) -> None:
     made = variant(flavour, "Told", {"error_estimate": "on"})
     assert made.exchange == {}
     assert made.own_starts == {"error_estimate": ON}
+
+
+# ---- the command
+
+
+@pytest.mark.usefixtures("native_at_hand")
+def test_a_run_tells_how_far_it_is_off(shell: Shell) -> None:
+    """The line is that of the columns; the estimate of the launch is near what the exact solution says."""
+    files = ("--output", "run.csv", "--plot", "run.png", "--animate", "run.html")
+    printed = shell.ok("simulate", "--error", "--set", "step_size=0.1", "--stop-time", "20", *files)
+    table = np.genfromtxt(shell.folder / "run.csv", delimiter=",", names=True, deletechars="")
+    off = table["error.position"]
+    exact = SCENES["launch"].exact
+    assert exact is not None
+    assert off[1:] == pytest.approx(np.abs(exact(table["time"])[0] - table["pose.x"])[1:], rel=0.02)
+    share = 100.0 * off[-1] / table["pose.x"][-1]
+    line = f"error, as told  at the end {1e3 * off[-1]:.3g} mm off ({share:.2g} % of the path), at most"
+    assert line in printed
+    assert "mm off" in (shell.folder / "run.html").read_text()
+    assert "error, as told" not in shell.ok("simulate", "--stop-time", "1")
+
+
+def test_a_circle_as_wide_as_the_doubt_goes_with_the_craft(native_fmu: Path) -> None:
+    start_values: dict[str, Value] = {"error_estimate": "on", "integrator": "drag_implicit", "step_size": 0.5}
+    result = simulate("turn", native_fmu, start_values=start_values, stop_time=20.0)
+    track = Track(result, "", "#000000")
+    for i in (50, -1):
+        radii = np.hypot(*(np.array(track.doubt(i)) - [track.x[i], track.y[i]]).T)
+        assert radii == pytest.approx(np.full(len(radii), result["error.position"][i]))
+    assert Track(simulate("turn", native_fmu, stop_time=1.0), "", "#000000").doubt(-1) == []
+
+
+def test_where_it_is_lost_the_words_say_so(native_fmu: Path) -> None:
+    start_values: dict[str, Value] = {
+        "error_estimate": "on", "step_size": 1.0, "drag_coefficient": 0.0, "velocity.yaw_rate": 6.0,
+    }  # fmt: skip
+    result = simulate("launch", native_fmu, start_values=start_values, stop_time=40.0, communication_step=1.0)
+    assert result.error_in_words == "lost: off by more than can be told"

@@ -6,7 +6,7 @@ from .control_log import read_inputs
 from .fmu_run import Stepper, run_fmu, simulate, stepping
 from .planning import Inputs, Progress, Run, method_in_words, plan
 from .points import communication_points, controls_at, schedule
-from .result import Result, path_length, write_csv
+from .result import Result, metres, path_length, write_csv
 
 __all__ = [
     "Inputs",
@@ -18,6 +18,7 @@ __all__ = [
     "communication_points",
     "controls_at",
     "method_in_words",
+    "metres",
     "path_length",
     "plan",
     "read_inputs",

@@ -11,6 +11,8 @@ import fmpy.util
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fmu.interface import ERROR_LOST
+from ..model.error_estimate import ON
 from .planning import Run
 
 
@@ -38,6 +40,25 @@ class Result:
         """m: length of the path from communication point to communication point."""
         return path_length(self["pose.x"], self["pose.y"])
 
+    @property
+    def is_estimated(self) -> bool:
+        """Whether the FMU has told how far it is off: columns `error.position` [m] and `error.heading` [rad]."""
+        return self.run.value("error_estimate") == ON and "error.position" in self.names
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether that cannot be trusted in the end."""
+        return self.is_estimated and bool(self["warnings"][-1] & ERROR_LOST)
+
+    @property
+    def error_in_words(self) -> str:
+        """'at the end 0.12 m off (0.02 % of the path), at most 0.31 m', of a run that is estimated."""
+        off = self["error.position"]
+        share = 100.0 * off[-1] / self.distance if self.distance > 0.0 else 0.0
+        if self.is_lost:
+            return "lost: off by more than can be told"
+        return f"at the end {metres(off[-1])} off ({share:.2g} % of the path), at most {metres(off.max())}"
+
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write all columns as CSV, with all digits. Raises OSError where that cannot be done."""
         return write_csv(self.data, path)
@@ -46,6 +67,13 @@ class Result:
 def path_length(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
     """m: of a polyline."""
     return float(np.hypot(np.diff(x), np.diff(y)).sum())
+
+
+def metres(distance: float) -> str:
+    """In words: '0.12 m', '3.4 mm', '2e-06 m'."""
+    if 1e-3 <= distance < 0.1:
+        return f"{distance * 1e3:.3g} mm"
+    return f"{distance:.3g} m" if distance >= 0.1 else f"{distance:.2g} m"
 
 
 def write_csv(data: NDArray[np.void], path: str | os.PathLike[str]) -> Path:

@@ -3,7 +3,7 @@
 import importlib
 import os
 from collections.abc import Callable, Sequence
-from math import ceil, floor, hypot, nan
+from math import ceil, cos, floor, hypot, nan, pi, sin
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor
 
 from ..fmu.icon import outline
-from ..simulation import Result
+from ..simulation import Result, metres
 from .palette import FAINT_LINE, INK, JETS, METHODS, OTHER, QUIET, SERIES
 from .plots import new_figure
 from .shapes import Shape, jets, placed
@@ -33,6 +33,8 @@ STRENGTHS = 8
 """Of a colour, in a GIF."""
 PATH_POINTS = 2000
 """Of a path in a page, at most."""
+ROUND = 49
+"""Points of a circle."""
 DECADES = 1e-5
 """Of the largest distance: what the logarithmic axis begins at."""
 POINTED_AT = "%{x:.2f} s: %{y:.3g} m apart<extra></extra>"
@@ -72,6 +74,13 @@ class Track(NamedTuple):
         row = self.result
         controls = (row["applied.thrust"][i], *np.clip([row["port_thruster"][i], row["starboard_thruster"][i]], 0, 1))
         return {name: self._placed(i, each) for name, each in jets(row.run.craft, *controls).items()}
+
+    def doubt(self, i: int) -> Shape:
+        """A circle around the craft, as wide as it may be off [m]; nothing where that is not told."""
+        if not self.result.is_estimated or self.result.is_lost:
+            return []
+        radius, x, y = self.result["error.position"][i], self.x[i], self.y[i]
+        return [(x + radius * cos(angle), y + radius * sin(angle)) for angle in np.linspace(0.0, 2.0 * pi, ROUND)]
 
     def _placed(self, i: int, points: Shape) -> Shape:
         return placed(points, *(float(self.result[name][i]) for name in ("pose.x", "pose.y", "pose.heading")))
@@ -120,7 +129,8 @@ def _names(results: Sequence[Result]) -> list[str]:
         setting = ", ".join([run.method, *(f"{name} {run.value(name):g}" for name in differ)])
         substeps = f"{result['substeps'][-1]:,} sub-steps".replace(",", " ")
         stages = run.settings.integrator.stages
-        names.append(f"{setting}: {substeps}{f' of {stages} stages' if stages > 1 else ''}")
+        told = f"; {result.error_in_words}" if result.is_estimated else ""
+        names.append(f"{setting}: {substeps}{f' of {stages} stages' if stages > 1 else ''}{told}")
     return names
 
 
@@ -139,14 +149,7 @@ def apart(tracks: Sequence[Track]) -> NDArray[np.float64]:
 def _title(tracks: Sequence[Track]) -> str:
     result = tracks[0].result
     title = f"{result.run.title}: {result.distance:.0f} m in {result['time'][-1] - result['time'][0]:g} s"
-    return title if len(tracks) == 1 else f"{title}; at the end {_metres(apart(tracks)[-1])} apart"
-
-
-def _metres(distance: float) -> str:
-    for unit, size in (("m", 1.0), ("mm", 1e-3)):
-        if distance >= size:
-            return f"{distance / size:.3g} {unit}"
-    return f"{distance:.2g} m"
+    return title if len(tracks) == 1 else f"{title}; at the end {metres(apart(tracks)[-1])} apart"
 
 
 def _frames(tracks: Sequence[Track]) -> NDArray[np.int_]:
@@ -291,6 +294,7 @@ class _Mover:
         (self._trail,) = axes.plot([], [], color=color, linewidth=1.8, linestyle=dash, animated=True)
         face = f"{color}80" if filled else "none"
         (self._hull,) = axes.fill([0.0], [0.0], facecolor=face, edgecolor=color, linewidth=1.6, animated=True)
+        (self._doubt,) = axes.fill([0.0], [0.0], facecolor=f"{color}30", edgecolor=color, linewidth=0.8, animated=True)
         self._jets = {name: axes.fill([0.0], [0.0], facecolor=each, animated=True)[0] for name, each in JETS.items()}
 
     def draw(self, i: int) -> None:
@@ -299,6 +303,9 @@ class _Mover:
         self._trail.set_data(track.x[: i + 1], track.y[: i + 1])
         self._axes.draw_artist(self._whole)
         self._axes.draw_artist(self._trail)
+        if circle := track.doubt(i):
+            self._doubt.set_xy(np.array(circle))
+            self._axes.draw_artist(self._doubt)
         for name, corners in track.jets(i).items():
             self._jets[name].set_xy(np.array(corners))
             self._axes.draw_artist(self._jets[name])
@@ -394,6 +401,9 @@ def _moving_traces(tracks: Sequence[Track], i: int) -> list[tuple[dict[str, Any]
             traces.append(({**plain, **corners, "fill": "toself", "fillcolor": color, "line_width": 0}, 1))
         fill = {"fill": "toself", "fillcolor": track.color} if n == 0 else {}
         traces.append(({**plain, **_columns(track.hull(i)), **fill, "line": {"color": track.color, "width": 2}}, 1))
+        if track.result.is_estimated:
+            doubt = {"fill": "toself", "fillcolor": track.color, "opacity": 0.3, "line_width": 0}
+            traces.append(({**plain, **_columns(track.doubt(i)), **doubt}, 1))
     if len(tracks) == 2:
         mark = {"x": [tracks[0].result["time"][i]], "y": [apart(tracks)[i]]}
         traces.append(({**plain, **mark, "mode": "markers", "marker": {"color": INK, "size": 8}}, 2))

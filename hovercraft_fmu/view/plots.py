@@ -24,7 +24,8 @@ CRAFT_COUNT = 25
 
 
 def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
-    """Draw the path with the craft along it, the controls, the speeds and the heading over time, as a PNG.
+    """Draw the path with the craft along it, the controls, the speeds and the heading over time, as a PNG; and where
+    the FMU tells it how far it is off.
 
     Raises:
         ValueError, ModuleNotFoundError: see `check_plot`.
@@ -32,8 +33,10 @@ def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
     """
     path = check_plot(path)
     figure = new_figure(figsize=(12.0, 6.75), dpi=120, layout="constrained")
-    grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
-    figure.suptitle(f"{result.run.title}: {result.distance:.0f} m in {result['time'][-1] - result['time'][0]:g} s")
+    grid = figure.add_gridspec(3 + result.is_estimated, 2, width_ratios=(1.25, 1.0))
+    told = f"; {result.error_in_words}" if result.is_estimated else ""
+    title = f"{result.run.title}: {result.distance:.0f} m in {result['time'][-1] - result['time'][0]:g} s"
+    figure.suptitle(title + told)
     _draw_path(figure.add_subplot(grid[:, 0]), result)
     controls = figure.add_subplot(grid[0, 1])
     speed = figure.add_subplot(grid[1, 1], sharex=controls)
@@ -42,6 +45,9 @@ def plot_run(result: Result, path: str | os.PathLike[str]) -> Path:
     _draw_controls(controls, result["time"], result["applied.thrust"], thrusters)
     _draw_speed(speed, result)
     _draw_heading(heading, result)
+    if result.is_estimated:
+        heading.set_xlabel("")
+        _draw_error(figure.add_subplot(grid[3, 1], sharex=controls), result)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, format="png", metadata={"Software": None})
     return path
@@ -207,4 +213,16 @@ def _draw_heading(axes: "Axes", result: Result) -> None:
     axes.set_ylabel("[deg], to starboard")
     axes.set_xlabel("time [s]")
     axes.set_title("Heading", loc="left")
+    axes.grid(alpha=0.3)
+
+
+def _draw_error(axes: "Axes", result: Result) -> None:
+    """On a scale of decades; 0, as at the start, is not on it."""
+    off = result["error.position"]
+    axes.plot(result["time"], np.where(off > 0.0, off, np.nan), color=SEA)
+    if off.any():
+        axes.set_yscale("log")
+    axes.set_ylabel("[m]")
+    axes.set_xlabel("time [s]")
+    axes.set_title("Off the exact solution, as the FMU tells it", loc="left")
     axes.grid(alpha=0.3)
