@@ -97,12 +97,13 @@ def test_what_is_recorded_replays_to_the_same_bits(
     assert logs == [log]
     h = run.communication_step
     rows = read_inputs(log)
-    assert rows["time"].tolist() == [n * h for n in range(len(rows))]
+    steps = len(set(rows["time"])) - 1
+    assert sorted(set(rows["time"])) == [n * h for n in range(steps + 1)]
     assert rows["time"][-1] == pytest.approx(2.4 * TIME_SCALE, abs=h)
     assert all(len(set(rows[name])) > 1 for name in ("thrust", "port_thruster", "starboard_thruster", "wind.y"))
     replayed = simulate(log, each_fmu, preset=preset, start_values=start_values, communication_step=h)
     assert end(replayed) == state
-    assert len(replayed["time"]) == len(rows)
+    assert replayed["time"].tolist() == [n * h for n in range(steps + 1)]
 
 
 def test_the_motion_does_not_depend_on_the_frames(fmu: Path, tmp_path: Path) -> None:
@@ -192,7 +193,8 @@ def test_a_reset_goes_back_to_the_start_and_keeps_the_record(fmu: Path, tmp_path
     assert other.read_text() == "of another day"
     lasts = [read_inputs(log)["time"][-1] for log in logs]
     assert lasts == pytest.approx([1.2 * TIME_SCALE, 0.8 * TIME_SCALE], abs=0.011)
-    assert read_inputs(logs[1])["thrust"][[0, 100]].tolist() == [5.0, 6.0]
+    rows = read_inputs(logs[1])
+    assert rows["thrust"][[0, np.flatnonzero(rows["time"] == 1.0)[-1]]].tolist() == [5.0, 6.0]
     assert end(simulate(logs[1], fmu, preset="ice")) == state
 
 

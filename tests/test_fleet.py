@@ -19,7 +19,7 @@ from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.model.subcycling import Settings
-from hovercraft_fmu.simulation import plan, schedule
+from hovercraft_fmu.simulation import held_steps, plan
 from tests.native import IN_TURN, KERNEL_FILES, STEPS, Kernel, compile_c
 
 pytestmark = pytest.mark.usefixtures("fleet")
@@ -98,7 +98,7 @@ def test_every_scene(name: str, method: str, kernel: Kernel) -> None:
     run = plan(name, start_values={"integrator": method, "step_size": STEPS[method]})
     states = np.tile(np.array(run.start)[:, None], 9)
     state, proposed, own = run.start, np.zeros(9), 0.0
-    for time, end, held in schedule(run):
+    for time, end, held in held_steps(run):
         found = advance_fleet(states, held, run.craft, end - time, run.settings, proposed=proposed)
         states, proposed = found.states, found.proposed
         outcome, made = kernel.advance(state, held, run.craft, end - time, run.settings, own)

@@ -21,7 +21,7 @@ from hovercraft_fmu.fmu.description import NATIVE3
 from hovercraft_fmu.fmu.interface import DERIVATIVES, ERRORS, INPUTS, MOTION, STATES, TIME, VARIABLES
 from hovercraft_fmu.host import read_description
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import plan, run_fmu
+from hovercraft_fmu.simulation import holding, plan, run_fmu
 from tests.lowlevel import everything, one, put, reference, start
 from tests.native import IN_TURN, STEPS
 from tests.test_native import METHODS
@@ -54,7 +54,7 @@ def shared(native3_fmu: Path) -> Iterator[tuple[Any, list[str]]]:
 @pytest.mark.parametrize(("scene", "method"), IN_TURN.items())
 def test_the_bits_of_fmi_2_in_every_scene(scene: str, method: str, native_fmu: Path, native3_fmu: Path) -> None:
     """With one of the methods; all four with every term follow."""
-    run = plan(scene, start_values={"integrator": method, "step_size": STEPS[method]})
+    run = holding(plan(scene, start_values={"integrator": method, "step_size": STEPS[method]}))
     found, expected = run_fmu(run, native3_fmu), run_fmu(run, native_fmu)
     assert found.names == expected.names
     assert np.array_equal(found.data, expected.data)

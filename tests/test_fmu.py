@@ -15,7 +15,7 @@ from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES
 from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import Run, plan, run_fmu, run_model
+from hovercraft_fmu.simulation import Run, holding, plan, run_fmu, run_model
 from tests.conftest import Fresh
 from tests.lowlevel import get, one, reference, start
 
@@ -81,7 +81,7 @@ def write_runs(folder: Path, scene: str) -> None:
 def assert_equal_to_the_model(folder: Path) -> None:
     runs = planned()
     for path in folder.glob("*.result.npy"):
-        result, bare = np.load(path), run_model(runs[path.name.removesuffix(".result.npy")])
+        result, bare = np.load(path), run_model(holding(runs[path.name.removesuffix(".result.npy")]))
         assert set(result.dtype.names) == set(bare.names)
         for column in bare.names:
             assert np.array_equal(result[column], bare[column]), (path.name, column)

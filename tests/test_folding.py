@@ -16,7 +16,7 @@ from hovercraft_fmu.model.dynamics import State
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.model.subcycling import advance, substeps
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import Run, plan, schedule
+from hovercraft_fmu.simulation import Run, held_steps, plan
 from tests.native import C_TESTS, c_compiler, compile_c
 
 SMOOTH = [scene for scene in SCENES.values() if not scene.craft.rubs]
@@ -50,7 +50,7 @@ def _written_out(program: Path, run: Run) -> list[tuple[Fraction, ...]]:
     """Where the craft is, and how it moves, after each communication step."""
     method = INTEGRATORS.index(run.settings.integrator) + 1
     lines = [(*_constants(run.craft), *run.start, float(method))]
-    for time, end, held in schedule(run):
+    for time, end, held in held_steps(run):
         n, h = substeps(end - time, run.settings.step_size)
         lines.append((float(n), h, *held))
     text = "\n".join(" ".join(value.hex() for value in line) for line in lines)
@@ -61,7 +61,7 @@ def _written_out(program: Path, run: Run) -> list[tuple[Fraction, ...]]:
 
 def _ours(run: Run) -> list[State]:
     state, states = run.start, []
-    for time, end, held in schedule(run):
+    for time, end, held in held_steps(run):
         state = advance(state, held, run.craft, end - time, run.settings).state
         states.append(state)
     return states

@@ -27,7 +27,7 @@ from hovercraft_fmu.fmu.interface import INPUT_HELD, INPUTS, MOTION, STATES, STE
 from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.host import read_description
-from hovercraft_fmu.simulation import plan, run_fmu, run_model
+from hovercraft_fmu.simulation import holding, plan, run_fmu, run_model
 from tests.blobs import signed, with_word
 from tests.conftest import FMI_2, ROOT, Built
 from tests.lowlevel import Instance3, count, everything, get, named, one, put, reference, start, worded
@@ -55,7 +55,7 @@ def ramp(instance: Any, **rates: float) -> None:
 @pytest.mark.parametrize(("name", "method"), IN_TURN.items())
 def test_every_scene_is_close_to_the_bare_model(name: str, method: str, native_fmu: Path) -> None:
     """With one of the methods; all with all are in test_native_kernel.py."""
-    run = plan(name, start_values={"integrator": method, "step_size": STEPS[method]})
+    run = holding(plan(name, start_values={"integrator": method, "step_size": STEPS[method]}))
     found, expected = run_fmu(run, native_fmu), run_model(run)
     assert found.warnings == ()
     assert np.array_equal(found["substeps"], expected["substeps"])

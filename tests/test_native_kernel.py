@@ -17,7 +17,7 @@ from hovercraft_fmu.model.error_estimate import Companion, accompany, estimated_
 from hovercraft_fmu.model.integrators import INTEGRATORS, Integrator, StepTooSmallError, Stretch
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, substeps
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import plan, schedule
+from hovercraft_fmu.simulation import held_steps, plan
 from tests.native import C_TESTS, STEPS, Kernel, Text, compile_c
 from tests.strategies import calm_crafts, controls, crafts, numbers, states
 
@@ -77,7 +77,7 @@ def test_every_scene_and_method(name: str, method: str, libm: Kernel, shipped: K
     state = python = run.start
     proposed = python_proposed = other = 0.0
     near = run.start
-    for time, end, held in schedule(run):
+    for time, end, held in held_steps(run):
         expected = advance(python, held, craft, end - time, how, proposed=python_proposed)
         outcome, made = libm.advance(state, held, craft, end - time, how, proposed)
         assert (outcome, made) == ("advanced", expected)

@@ -20,7 +20,7 @@ from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, PLATFORMS, caches
 from hovercraft_fmu.fmu.native_header import constant
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.scenes import SCENES
-from hovercraft_fmu.simulation import Run, plan, schedule
+from hovercraft_fmu.simulation import Run, held_steps, plan
 from tests.lowlevel import one
 from tests.native import C_INCLUDES, C_TESTS, STEPS, c_compiler
 
@@ -47,7 +47,7 @@ def runs_header() -> str:
     lines += ["             const double (*rows)[2 + INPUT_COUNT]; unsigned steps; };"]
     table = []
     for name, run in runs().items():
-        rows = [(time, end - time, *held) for time, end, held in schedule(run)]
+        rows = [(time, end - time, *held) for time, end, held in held_steps(run)]
         lines += [
             f"static const double {name}[][2 + INPUT_COUNT] = {{",
             *(f"    {_braced(map(repr, row))}," for row in rows),
@@ -102,7 +102,7 @@ def paths_on(unpacked: Unpacked, platform: str, command: list[str], *runner: str
     done = subprocess.run([*command, *host, *libraries], cwd=path.parent, env=environment, check=True)
     done = subprocess.run([*runner, program], cwd=path.parent, env=environment, capture_output=True, timeout=600)
     assert done.returncode == 0, done.stderr
-    sizes = {name: 8 * len(SEEN) * len(list(schedule(run))) for name, run in runs().items()}
+    sizes = {name: 8 * len(SEEN) * len(list(held_steps(run))) for name, run in runs().items()}
     ends = list(itertools.accumulate(sizes.values()))
     assert len(done.stdout) == ends[-1]
     return {name: done.stdout[end - sizes[name] : end] for name, end in zip(sizes, ends, strict=True)}
@@ -123,7 +123,7 @@ def test_the_host_in_c_sees_what_fmpy_sees(here: Paths, each_native_fmu: Path) -
     found = b""
     with one(each_native_fmu) as (instance, _):
         _start(instance, run)
-        for time, end, held in schedule(run):
+        for time, end, held in held_steps(run):
             instance.setReal([BY_NAME[name].reference for name in INPUTS], list(held))
             instance.doStep(time, end - time)
             found += struct.pack(f"<{len(SEEN)}d", *instance.getReal(references))

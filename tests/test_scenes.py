@@ -5,7 +5,7 @@ from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES, Scene, held, scene
-from hovercraft_fmu.simulation import communication_points, plan, run_model
+from hovercraft_fmu.simulation import plan, run_model, schedule
 
 EXACT = [each for each in SCENES.values() if each.exact]
 NAMES = [each.name for each in EXACT]
@@ -101,5 +101,5 @@ def test_held_controls_jump() -> None:
 
 def test_a_jump_between_communication_points_is_one() -> None:
     run = plan(Scene("jump", "", held(1.0, (0.0, 5.0, 0.0, 0.0), (0.25, 6.0, 0.0, 0.0))), communication_step=0.2)
-    points = [end for _, end in communication_points(run)]
+    points = [piece.end for piece in schedule(run) if piece.is_point]
     assert points == pytest.approx([0.2, 0.25, 0.4, 0.6, 0.8, 1.0])

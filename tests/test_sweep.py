@@ -134,7 +134,7 @@ def test_merging_keeps_time_controls_sub_steps_and_what_is_kept(
 ) -> None:
     ends = np.cumsum([0, *(n for n, _, _ in parts)])
     legs = [
-        Leg(ends[i] * 0.1, ends[i + 1] * 0.1, Controls(float(thrust)), kept)
+        Leg(ends[i] * 0.1, ends[i + 1] * 0.1, Controls(float(thrust)), Controls(float(thrust)), kept)
         for i, (_, kept, thrust) in enumerate(parts)
     ]
     settings = Settings(step_size, integrator(method))
@@ -144,7 +144,7 @@ def test_merging_keeps_time_controls_sub_steps_and_what_is_kept(
     assert all(a.end == b.time for a, b in itertools.pairwise(made))
     for leg in made:
         inside = [each for each in legs if leg.time <= each.time and each.end <= leg.end]
-        assert {each.controls for each in inside} == {leg.controls}
+        assert {(each.first, each.last) for each in inside} == {(leg.first, leg.last)}
         if len(inside) > 1:
             steps = [meant_step(each.time, each.end - each.time, 0.0, step_size) for each in (*inside, leg)]
             *cuts, whole = (substeps(step, step_size) for step in steps)

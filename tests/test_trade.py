@@ -17,7 +17,7 @@ from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.model.subcycling import advance, substeps
 from hovercraft_fmu.scenes import SCENES, Scene
-from hovercraft_fmu.simulation import plan, schedule
+from hovercraft_fmu.simulation import held_steps, plan
 from hovercraft_fmu.studies import model_exchange
 from hovercraft_fmu.studies.laboratory import Ready, Timed, interleaved, text
 from hovercraft_fmu.studies.reference_end import reference_end
@@ -128,7 +128,7 @@ def test_a_scene_with_every_term_off_is_that_of_the_plain_loop(scene: Scene, loo
     """What speed is compared with does the same."""
     run = plan(scene)
     ours = theirs = run.start
-    for time, end, asked in schedule(run):
+    for time, end, asked in held_steps(run):
         ours = advance(ours, asked, run.craft, end - time, run.settings).state
         n, h = substeps(end - time, run.settings.step_size)
         theirs = loops.plain(theirs, asked, run.craft, h, n)

@@ -1,6 +1,6 @@
 """The class that drives an instance of an FMU, of FMI 2.0 or 3.0, for co-simulation or model exchange."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import byref, c_bool, c_double, c_int
 from functools import cached_property
@@ -266,38 +266,6 @@ class Instance:
             status = self._do_step(self.component, time, duration, 1)
         if status > WARNING:
             self.check(status)
-
-    def follow(
-        self,
-        legs: Iterable[tuple[float, float, Any, bool]],
-        put: Callable[[Any], None],
-        seen: "Port",
-        rows: Iterable[Any],
-    ) -> None:
-        """Many steps: beside the FMU's own code they cost what their calls through ctypes cost.
-
-        Args:
-            legs: start [s], end [s], inputs, whether `seen` is read at the end.
-            put: sets inputs; it is called where they change.
-            seen: variables of one type.
-            rows: where what is read goes, one after the other; see `Port.over`.
-        """
-        is_fmi_3, component, do_step = self.is_fmi_3, self.component, self._do_step
-        get, references, count = seen.call
-        row, held = iter(rows), None
-        for time, end, wanted, kept in legs:
-            if wanted is not held and wanted != held:
-                put(wanted)
-            held = wanted
-            if is_fmi_3:
-                self.step(time, end - time)
-                if kept:
-                    seen.get_into(next(row))
-                continue
-            if (status := do_step(component, time, end - time, 1)) > WARNING:
-                self.check(status)
-            if kept and (status := get(component, references, count, next(row))) > WARNING:
-                self.check(status)
 
     def reset(self) -> None:
         """Back to what it was when it was made. After a fatal error the standards allow no call: it is made anew."""

@@ -5,18 +5,20 @@ from .bare_run import run_model
 from .control_log import read_inputs
 from .fmu_run import Stepper, run_fmu, simulate, stepping
 from .planning import Inputs, Progress, Run, method_in_words, plan
-from .points import communication_points, controls_at, schedule
+from .points import Piece, ends, held_steps, holding, schedule
 from .result import Result, metres, path_length, write_csv
 
 __all__ = [
     "Inputs",
+    "Piece",
     "Progress",
     "Result",
     "Run",
     "Stepper",
     "Value",
-    "communication_points",
-    "controls_at",
+    "ends",
+    "held_steps",
+    "holding",
     "method_in_words",
     "metres",
     "path_length",

@@ -1,20 +1,22 @@
-"""A run on an FMU: through fmpy's master, or step by step."""
+"""A run on an FMU, as it was planned or step by step."""
 
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from math import isclose
+from dataclasses import replace
 from typing import Any
 
-import fmpy
 import numpy as np
 
 from ..building import default_fmu
 from ..fmu.interface import BY_NAME, HOVERCRAFT, INPUTS
 from ..fmu.start_values import Value, start_value
-from ..host import Fmu, Instance, SimulationError
+from ..host import Fmu, Instance
+from ..host.ramps import Ramps
 from ..model.dynamics import Controls
 from .planning import Inputs, Progress, Run, plan
+from .points import Piece, ends
+from .recording import recorded
 from .result import Result
 
 
@@ -39,7 +41,7 @@ def simulate(
 
     Raises:
         ValueError: an input, a name or a value that cannot be; FileNotFoundError: no such file.
-        SimulationError: the FMU refused a value or a step, with its message; or the run ended early.
+        SimulationError: the FMU refused a value or a step, with its message.
     """
     run = plan(
         scene_or_inputs, preset=preset, start_values=start_values, start_time=start_time, stop_time=stop_time,
@@ -49,38 +51,37 @@ def simulate(
 
 
 def run_fmu(run: Run, fmu: str | os.PathLike[str], progress: Progress | None = None) -> Result:
-    """Run on an FMU, through fmpy, with its logging on. Raises as `simulate` does."""
+    """Run on an FMU, with its logging on. Raises as `simulate` does."""
+    with stepping(run, fmu) as stepper:
+        columns = list(_shown(stepper.description))
+        seen = stepper.port(*(name for name, _ in columns))
 
-    def step_finished(time: float, _recorder: object) -> bool:
-        if progress:
-            progress(time)
-        return True
+        def go(piece: Piece) -> None:
+            stepper.make(piece)
+            if progress and piece.is_point:
+                progress(piece.end)
 
-    with Fmu(fmu, HOVERCRAFT.name) as opened, opened.instance() as craft, craft.driven_by_fmpy():
-        run = run.on(own_starts(opened.description))
-        shown = [v.name for v in opened.description.modelVariables if v.causality in ("input", "output", "local")]
-        data = fmpy.simulate_fmu(
-            opened.folder,
-            model_description=opened.description,
-            fmu_instance=craft.fmpy,
-            start_time=run.start_time,
-            stop_time=run.stop_time,
-            output_interval=run.communication_step,
-            start_values=dict(run.start_values),
-            input=run.signals,
-            output=shown,
-            step_finished=step_finished,
-        )
-    if not isclose(data["time"][-1], run.stop_time):
-        raise SimulationError(f"the run ended at {data['time'][-1]!r} s: must reach stop_time = {run.stop_time!r} s")
-    return Result(np.asarray(data), run, tuple(craft.messages))
+        stepper.start(ends(stepper.run)[0], run.stop_time)
+        result = recorded(stepper.run, columns, go, seen.get)
+        return replace(result, warnings=tuple(stepper.messages))
+
+
+TYPES = {"Float64": np.float64, "Real": np.float64, "Boolean": np.bool_}
+"""Of the standards' types; the others are whole numbers."""
+
+
+def _shown(description: Any) -> Iterator[tuple[str, Any]]:
+    """Name and type of an FMU's inputs, outputs and local variables; the Reals first."""
+    variables = [v for v in description.modelVariables if v.causality in ("input", "output", "local")]
+    for variable in sorted(variables, key=lambda v: TYPES.get(v.type) is not np.float64):
+        yield variable.name, TYPES.get(variable.type, np.int32)
 
 
 class Stepper:
-    """An FMU that is taken from one communication point to the next by hand, with the calls of fmpy's master.
+    """An FMU on its way through a run: piece by piece, or by hand from one communication point to the next.
 
-    So `run_fmu` over the same controls, a row a communication point, comes to the same bits. It raises
-    SimulationError where the FMU refuses a call.
+    By hand and by `run_fmu` over the same controls, held, it comes to the same bits. It raises SimulationError where
+    the FMU refuses a call.
     """
 
     def __init__(self, craft: Instance, run: Run) -> None:
@@ -88,22 +89,26 @@ class Stepper:
         """What the FMU has said since it was started."""
         self.port = craft.port
         """Of the FMU, to read from: see `Instance.port`."""
-        self._craft, self._run, self._inputs = craft, run, craft.port(*INPUTS)
+        self.description = craft.description
+        """fmpy's."""
+        self.run = run
+        """With the start values that are the FMU's own."""
+        self._craft, self._ramps = craft, Ramps(craft, INPUTS)
         self._steps = 0
 
     @property
     def time(self) -> float:
-        """s: the communication point reached."""
+        """s: the communication point reached by hand."""
         return self._point(self._steps)
 
     def _point(self, n: int) -> float:
-        return self._run.start_time + n * self._run.communication_step
+        return self.run.start_time + n * self.run.communication_step
 
-    def start(self, controls: Controls) -> None:
+    def start(self, controls: Controls, stop_time: float | None = None) -> None:
         """Initialize it, at the start time."""
-        self._craft.set(self._run.start_values)
-        self._craft.enter_initialization(self._run.start_time)
-        self._inputs.set(controls)
+        self._craft.set(self.run.start_values)
+        self._craft.enter_initialization(self.run.start_time, stop_time)
+        self._ramps.inputs.set(controls)
         self._craft.exit_initialization()
 
     def restart(self, controls: Controls) -> None:
@@ -113,17 +118,19 @@ class Stepper:
         self.messages.clear()
         self.start(controls)
 
+    def make(self, piece: Piece) -> None:
+        """One piece of the run."""
+        self._ramps.step(piece.time, piece.end, piece.first, piece.last)
+
     def step(self, controls: Controls) -> None:
         """One communication step, with the controls held."""
-        time = self.time
-        self._inputs.set(controls)
-        self._craft.step(time, self._point(self._steps + 1) - time)
+        self._ramps.step(self.time, self._point(self._steps + 1), controls, controls)
         self._steps += 1
 
 
 @contextmanager
 def stepping(run: Run, fmu: str | os.PathLike[str]) -> Iterator[Stepper]:
-    """An FMU to step by hand, not yet started. Raises as `simulate` does."""
+    """An FMU, not yet started. Raises as `simulate` does."""
     with Fmu(fmu, HOVERCRAFT.name) as opened, opened.instance() as craft:
         yield Stepper(craft, run.on(own_starts(opened.description)))
 

@@ -24,6 +24,9 @@ class Result:
     run: Run
     warnings: tuple[str, ...] = ()
     """What the FMU said that did not end the run."""
+    whole: NDArray[np.void] | None = None
+    """The rows of `data`, and between them one more on the other side of every jump of the inputs, and one where they
+    bend: all that tells how they went."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self.names:
@@ -60,8 +63,11 @@ class Result:
         return f"at the end {metres(off[-1])} off ({share:.2g} % of the path), at most {metres(off.max())}"
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write all columns as CSV, with all digits. Raises OSError where that cannot be done."""
-        return write_csv(self.data, path)
+        """Write all columns as CSV, with all digits; as inputs of a run the file gives the same motion again.
+
+        So it has the rows of `whole`. Raises OSError where it cannot be written.
+        """
+        return write_csv(self.data if self.whole is None else self.whole, path)
 
 
 def path_length(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:

@@ -14,7 +14,7 @@ from ..model.craft import DIRECTIONAL
 from ..model.dynamics import State
 from ..model.subcycling import advance, meant_step
 from ..scenes import SCENES, Scene
-from ..simulation import plan, schedule
+from ..simulation import held_steps, plan
 from ..view.palette import INK, SHADES
 from ..view.plots import new_figure
 from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread
@@ -79,7 +79,7 @@ def walk(scene: Scene, settings: Mapping[str, Value]) -> Ready[list[State]]:
     """The whole scene on the bare model: the states at its own communication points."""
     run = plan(scene, start_values=settings)
     size = run.settings.step_size
-    steps = [(meant_step(time, end - time, run.start_time, size), controls) for time, end, controls in schedule(run)]
+    steps = [(meant_step(time, end - time, run.start_time, size), controls) for time, end, controls in held_steps(run)]
 
     def go() -> list[State]:
         states = [run.start]

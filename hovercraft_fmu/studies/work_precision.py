@@ -13,7 +13,7 @@ from ..host import Instance
 from ..model.dynamics import Controls, State, windy
 from ..model.subcycling import advance, meant_step
 from ..scenes import SCENES, Scene
-from ..simulation import Run, method_in_words, plan, schedule
+from ..simulation import Run, held_steps, holding, method_in_words, plan
 from ..view.palette import METHODS
 from ..view.plots import new_figure
 from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread
@@ -139,7 +139,7 @@ def measured(instance: Instance, scenes: Sequence[Scene], rounds: int, tell: Tel
     """
     cases: dict[tuple[str, Setting, str], Ready[Reached]] = {}
     for scene, step in itertools.product(scenes, COMMUNICATION_STEPS):
-        points = list(schedule(planned(scene, settings(step)[0])))
+        points = list(held_steps(planned(scene, settings(step)[0])))
         for setting in settings(step):
             run = planned(scene, setting)
             cases[scene.name, setting, "bare"] = bare(run, points)
@@ -215,7 +215,7 @@ def advice(found: pl.DataFrame) -> Findings:
 def reached(scene: Scene, setting: Setting) -> Reached:
     """Where the bare model ends."""
     run = planned(scene, setting)
-    return bare(run, list(schedule(run)))()()
+    return bare(run, list(held_steps(run)))()()
 
 
 def largest(end: State, exact: State) -> float:
@@ -257,7 +257,8 @@ def tolerance_errors(scenes: Sequence[str] = ORDER_SCENES) -> pl.DataFrame:
 def holding_costs() -> pl.DataFrame:
     """The position error [m] over the communication step [s], with RK4 at 0.01 s, whose own error is far below."""
     exact = _exact([HELD_SCENE])[HELD_SCENE]
-    ends = [reached(SCENES[HELD_SCENE], Setting("rk4", 0.01, step)).end for step in HOLDING_STEPS]
+    runs = [holding(planned(SCENES[HELD_SCENE], Setting("rk4", 0.01, step))) for step in HOLDING_STEPS]
+    ends = [bare(run, list(held_steps(run)))()().end for run in runs]
     errors = [math.dist(end[:2], exact[:2]) for end in ends]
     return pl.DataFrame({"communication_step": HOLDING_STEPS, "position_error": errors})
 

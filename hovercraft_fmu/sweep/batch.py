@@ -22,6 +22,7 @@ from ..fmu.interface import (
     WATCHED,
 )
 from ..host.fleet import Array, Crafts, advance_fleet, observe_fleet, refusals
+from ..host.ramps import slopes
 from ..model.dynamics import Controls, State
 from ..model.subcycling import NonFiniteError, Settings, meant_step
 from .engines import SETTINGS, Plan, Ran, empty, settings_of
@@ -97,8 +98,7 @@ class _Batch:
             self._keep(point, self._controls(timeline.start))
             point += 1
         for leg in _merged(timeline.legs, self._plan.run.start_time, self._settings):
-            controls = self._controls(leg.controls)
-            self._advance(leg, controls)
+            controls = self._advance(leg)
             if leg.kept:
                 self._keep(point, controls)
                 point += 1
@@ -108,9 +108,21 @@ class _Batch:
         given: Any = (self._samples.get(name, value) for name, value in zip(INPUTS, controls, strict=True))
         return Controls(*given)
 
-    def _advance(self, leg: Leg, controls: Controls) -> None:
+    def _slopes(self, leg: Leg) -> Controls | None:
+        """Those of swept inputs are 0."""
+        if leg.first == leg.last:
+            return None
+        given = zip(INPUTS, slopes(leg.end - leg.time, leg.first, leg.last), strict=True)
+        return Controls(*(0.0 if name in self._samples else slope for name, slope in given))
+
+    def _advance(self, leg: Leg) -> Controls:
+        """The controls at the end of the leg."""
         step = meant_step(leg.time, leg.end - leg.time, self._plan.run.start_time, self._settings.step_size)
-        fleet = advance_fleet(self._states, controls, self._crafts, step, self._settings, proposed=self._proposed)
+        rates = self._slopes(leg)
+        first = last = self._controls(leg.first)
+        if rates:
+            last = Controls(*(start + step * rate for start, rate in zip(first, rates, strict=True)))
+        fleet = advance_fleet(self._states, first, self._crafts, step, self._settings, rates, proposed=self._proposed)
         self._states, self._proposed = fleet.states, fleet.proposed
         for i, why in fleet.refused.items():
             self._errors.setdefault(i, _said(why, leg.time))
@@ -120,6 +132,12 @@ class _Batch:
         self._stability = np.maximum(self._stability, fleet.stability)
         self._rotation = np.maximum(self._rotation, fleet.rotation)
         self._substeps += fleet.substeps
+        self._look_for_held(first)
+        if rates:
+            self._look_for_held(last)
+        return last
+
+    def _look_for_held(self, controls: Controls) -> None:
         for value, limit in zip(controls[:3], self._saturated(controls), strict=True):
             self._held |= np.abs(value - limit) > HELD * np.maximum(1.0, np.abs(limit))
 

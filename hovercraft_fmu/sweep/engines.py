@@ -3,7 +3,7 @@
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from ..fmu.interface import INPUTS
 from ..host import Fmu, SimulationError
+from ..host.ramps import Ramps
 from ..model.dynamics import Controls
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..simulation import Run
 from .quantities import Keep, Record, Samples
-from .timeline import Timeline, merged
+from .timeline import Leg, Timeline, merged
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class Driver:
         self._merged = lru_cache(maxsize=16)(partial(merged, plan.timeline.legs, plan.run.start_time))
         names = tuple(dict.fromkeys((*plan.run.start_values, *swept)))
         self._shared = {name: plan.run.value(name) for name in (*names, *SETTINGS)}
-        self._start_values, self._inputs = self._craft.port(*names), self._craft.port(*INPUTS)
+        self._start_values, self._ramps = self._craft.port(*names), Ramps(self._craft, INPUTS)
         self._driven = [(i, name) for i, name in enumerate(INPUTS) if name in swept]
         self._warnings, self._read = self._craft.port("warnings"), self._craft.port(*plan.keep.read)
         self._record = np.empty((len(plan.timeline.times), len(plan.keep.read)))
@@ -118,18 +119,23 @@ class Driver:
         craft, run, timeline = self._craft, self._plan.run, self._plan.timeline
         self._start_values.set([values[name] for name in self._start_values.names])
         craft.enter_initialization(run.start_time, run.stop_time)
-        self._put(timeline.start, values)
+        self._ramps.inputs.set(self._driven_by(timeline.start, values))
         craft.exit_initialization()
         rows = iter(self._rows)
         if timeline.start_kept:
             self._read.get_into(next(rows))
-        craft.follow(self._merged(settings_of(values)), lambda wanted: self._put(wanted, values), self._read, rows)
+        legs: Sequence[Leg] = self._merged(settings_of(values))
+        if self._driven:
+            ends = ((self._driven_by(leg.first, values), self._driven_by(leg.last, values)) for leg in legs)
+            legs = [leg._replace(first=first, last=last) for leg, (first, last) in zip(legs, ends, strict=True)]
+        self._ramps.follow(legs, self._read, rows)
 
-    def _put(self, controls: Controls, values: Mapping[str, float | int]) -> None:
+    def _driven_by(self, controls: Controls, values: Mapping[str, float | int]) -> Controls:
+        """With the inputs that are swept."""
         given = list(controls)
         for i, name in self._driven:
             given[i] = values[name]
-        self._inputs.set(given)
+        return Controls(*given)
 
 
 @contextmanager

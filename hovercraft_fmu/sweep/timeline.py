@@ -8,18 +8,21 @@ from numpy.typing import NDArray
 
 from ..model.dynamics import Controls
 from ..model.subcycling import Settings, meant_step, substeps
-from ..simulation import Run, controls_at, schedule
+from ..simulation import Run, ends, schedule
 from .quantities import Keep
 
 
 class Leg(NamedTuple):
-    """A stretch of time with the controls held."""
+    """A stretch of time over which the controls are linear; the same controls are at both ends where they hold."""
 
     time: float
     """s, its start"""
     end: float
     """s"""
-    controls: Controls
+    first: Controls
+    """At its start."""
+    last: Controls
+    """At its end."""
     kept: bool
     """Whether what is at its end is kept."""
 
@@ -38,24 +41,23 @@ class Timeline(NamedTuple):
 
 
 def timeline(run: Run, keep: Keep) -> Timeline:
-    """The communication steps that `simulate` takes; the end is always kept."""
+    """The steps that `simulate` takes; the end is always kept."""
     start = run.start_time
 
     def is_sampled(time: float) -> bool:
         steps = (time - start) / keep.every if keep.every else 0.5
         return abs(steps - round(steps)) <= 1e-9 * max(1.0, steps)
 
-    legs = [Leg(time, end, controls, keep.watches or is_sampled(end)) for time, end, controls in schedule(run)]
+    legs = [Leg(*piece[:4], kept=piece.is_point and (keep.watches or is_sampled(piece.end))) for piece in schedule(run)]
     legs[-1] = legs[-1]._replace(kept=True)
     start_kept = keep.watches or is_sampled(start)
     times = [start] * start_kept + [leg.end for leg in legs if leg.kept]
     sampled = [is_sampled(time) for time in times[:-1]] + [keep.every is not None]
-    controls = controls_at(run, start, after_event=False)
-    return Timeline(controls, start_kept, tuple(legs), np.array(times), np.array(sampled))
+    return Timeline(ends(run)[0], start_kept, tuple(legs), np.array(times), np.array(sampled))
 
 
 def merged(legs: Iterable[Leg], start_time: float, settings: Settings) -> list[Leg]:
-    """Legs with the same controls as one, where nothing is kept in between and no bit of the end changes.
+    """Legs with the same controls, held, as one, where nothing is kept in between and no bit of the end changes.
 
     That is where each of them, and the whole, is a whole number of sub-steps: then all are `step_size` long, however
     the time is cut. Not with the adaptive method: it ends a step at every communication point.
@@ -65,16 +67,15 @@ def merged(legs: Iterable[Leg], start_time: float, settings: Settings) -> list[L
     whole: list[Leg] = []
     for leg in legs:
         last = whole[-1] if whole else None
-        if (
-            last
-            and not last.kept
-            and last.controls == leg.controls
-            and _as_one(last, leg, start_time, settings.step_size)
-        ):
+        if last and not last.kept and _hold_on(last, leg) and _as_one(last, leg, start_time, settings.step_size):
             whole[-1] = last._replace(end=leg.end, kept=leg.kept)
         else:
             whole.append(leg)
     return whole
+
+
+def _hold_on(first: Leg, second: Leg) -> bool:
+    return first.first == first.last == second.first == second.last
 
 
 def _as_one(first: Leg, second: Leg, start_time: float, step_size: float) -> bool:

@@ -24,7 +24,7 @@ FRAME_RATE = 60
 LONGEST_LAG = 0.25
 """s: what one frame catches up at most, and computes at most; the rest is dropped, and the drive runs slower."""
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0
-"""s, of the communication step: below, fmpy takes neighbouring rows of a long record for one jump."""
+"""s, of the communication step."""
 HELD_KEYS: Mapping[int, Action] = {
     pygame.K_UP: Action.MORE_THRUST,
     pygame.K_DOWN: Action.LESS_THRUST,
@@ -92,8 +92,9 @@ def drive(
     Args:
         run: see `plan_drive`.
         fmu: the file.
-        record: where the control log goes, one row a communication point: `simulate` over it, with the same craft,
-            settings and communication step, comes to the same bits. After a reset the next one goes beside it.
+        record: where the control log goes, a row a communication point, two where controls change: `simulate` over it,
+            with the same craft, settings and communication step, comes to the same bits. After a reset the next one
+            goes beside it.
         recorded: called with every log when it is complete, after an error, too.
         time_scale: simulated seconds a second, at the start.
         clock: what the window runs by, if not by the time that passes.
@@ -115,19 +116,22 @@ def drive(
 
 
 class ControlLog:
-    """A CSV file that grows while one drives."""
+    """A CSV file that grows while one drives: controls that hold, so a change is two rows at its time."""
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path, self.last = path, -inf
+        self._held: Controls | None = None
         self._file = path.open("w", newline="", encoding="utf-8")
         self._writer = csv.writer(self._file, lineterminator="\n")
         self._writer.writerow(("time", *INPUTS))
 
     def write(self, time: float, controls: Controls) -> None:
-        """One row, with all digits."""
+        """The controls from this communication point on, with all digits."""
+        if self._held not in (None, controls):
+            self._writer.writerow((time, *self._held))
         self._writer.writerow((time, *controls))
-        self.last = time
+        self.last, self._held = time, controls
 
     def close(self) -> None:
         """All is on the disk."""

@@ -1,0 +1,92 @@
+"""Inputs that are linear over a step, handed to an FMU in the way that it takes them."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, TypeAlias
+
+from .instance import Instance, Port
+from .messages import WARNING
+
+LONGEST_PART = 0.1
+"""s: of what is run with the value at its middle; the error of that goes with its square."""
+Leg: TypeAlias = tuple[float, float, Sequence[float], Sequence[float], bool]
+"""Start [s], end [s], the inputs at both, whether what is seen at the end is read."""
+
+
+class Ramps:
+    """Steps of an instance, each with inputs that go linearly from their values at its start to those at its end.
+
+    An FMU of FMI 2.0 that can interpolate inputs is given their slopes. Any other is given the values at the middle,
+    and where they change its steps are cut into parts no longer than LONGEST_PART. Inputs that hold are set, no more.
+    """
+
+    def __init__(self, craft: Instance, names: Sequence[str]) -> None:
+        self.inputs = craft.port(*names)
+        self._craft = craft
+        self._takes_slopes = not craft.is_fmi_3 and bool(craft.description.coSimulation.canInterpolateInputs)
+
+    def step(self, time: float, end: float, first: Sequence[float], last: Sequence[float]) -> None:
+        """From a communication point [s] to the next. Raises SimulationError: the FMU refused a call."""
+        craft, inputs = self._craft, self.inputs
+        if first == last:
+            inputs.set(first)
+            craft.step(time, end - time)
+        elif self._takes_slopes:
+            inputs.set(first)
+            inputs.set_slopes(slopes(end - time, first, last))
+            craft.step(time, end - time)
+        else:
+            for begin, until, middle in parts(time, end, first, last):
+                inputs.set(middle)
+                craft.step(begin, until - begin)
+
+    def follow(
+        self,
+        legs: Iterable[tuple[float, float, Sequence[float], Sequence[float], bool]],
+        seen: Port,
+        rows: Iterable[Any],
+    ) -> None:
+        """Many steps, with what is asked again and again asked once: so they cost what their calls through ctypes cost.
+
+        Args:
+            legs: the steps; where inputs hold the same object at both ends saves a look.
+            seen: variables of one type.
+            rows: where what is read goes, one after the other; see `Port.over`.
+        """
+        craft, inputs, do_step = self._craft, self.inputs, self._craft.function("DoStep")
+        is_fmi_3, component, row = craft.is_fmi_3, craft.component, iter(rows)
+        get, references, count = seen.call
+        held = None
+        for time, end, first, last, kept in legs:
+            if first is not last and first != last:
+                self.step(time, end, first, last)
+                held = None
+            else:
+                if first is not held and first != held:
+                    inputs.set(first)
+                held = first
+                if is_fmi_3:
+                    craft.step(time, end - time)
+                elif (status := do_step(component, time, end - time, 1)) > WARNING:
+                    craft.check(status)
+            if kept and is_fmi_3:
+                seen.get_into(next(row))
+            elif kept and (status := get(component, references, count, next(row))) > WARNING:
+                craft.check(status)
+
+
+def slopes(duration: float, first: Sequence[float], last: Sequence[float]) -> list[float]:
+    """Per s: of inputs that go from the first values to the last ones within a duration [s]."""
+    return [(b - a) / duration for a, b in zip(first, last, strict=True)]
+
+
+def parts(
+    time: float, end: float, first: Sequence[float], last: Sequence[float]
+) -> Iterator[tuple[float, float, list[float]]]:
+    """(start, end) [s] of the parts of a step, and the inputs at the middle of each; one part where they hold."""
+    duration = end - time
+    n = 1 if first == last else max(1, math.ceil(duration / LONGEST_PART * (1.0 - 1e-9)))
+    for k in range(n):
+        share = (k + 0.5) / n
+        middle = [a + share * (b - a) for a, b in zip(first, last, strict=True)]
+        yield time + k / n * duration, end if k + 1 == n else time + (k + 1) / n * duration, middle
