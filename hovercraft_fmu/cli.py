@@ -254,6 +254,7 @@ def drive_command(
     FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there. H shows the keys. What is
     recorded replays to the same bits, with the command that is printed at the end.
     """
+    from .fmu.interface import INPUTS
     from .view.drive import drive, plan_drive
     from .view.window import check_display
 
@@ -267,7 +268,8 @@ def drive_command(
     def recorded(log: Path) -> None:
         words = ["hovercraft-fmu", "simulate", str(path), "--input", str(log), "--preset", preset]
         words += ["--communication-step", repr(run.communication_step)]
-        words += [word for name, value in start_values.items() for word in ("--set", f"{name}={value}")]
+        kept = {name: value for name, value in start_values.items() if name not in INPUTS}  # the log drives the others
+        words += [word for name, value in kept.items() for word in ("--set", f"{name}={value}")]
         OUTPUT.print(f"recorded {log}; to replay it:\n  {shlex.join(words)}")
 
     end = drive(run, path, record=record, recorded=recorded, time_scale=time_scale)

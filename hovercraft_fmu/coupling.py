@@ -19,7 +19,7 @@ from .model.craft import Craft
 from .model.dynamics import Controls, State
 from .model.subcycling import Settings, advance, meant_step
 from .scenes import Voyage, voyage
-from .simulation import Progress, path_length, write_csv
+from .simulation import Progress, check_steps, path_length, write_csv
 
 JACOBI, GAUSS_SEIDEL = SCHEMES = ("jacobi", "gauss_seidel")
 """Both parts step side by side, with what the other one showed before; or the autopilot steps first, and the craft
@@ -162,6 +162,7 @@ def _sail(
     for name, value in (("communication_step", h), ("stop_time", end)):
         if not 0.0 < value < math.inf:
             raise ValueError(f"{name} = {value!r} s: must be a finite number greater than 0")
+    check_steps(0.0, end, h, len(COLUMNS))
     rows = []
     for time, shown in master(craft, pilot, scheme, h, round(end / h)):
         rows.append((time, *shown))

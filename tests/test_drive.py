@@ -18,7 +18,7 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from hovercraft_fmu.fmu.icon import outline
-from hovercraft_fmu.fmu.interface import STATES
+from hovercraft_fmu.fmu.interface import INPUTS, STATES
 from hovercraft_fmu.fmu.start_values import Value
 from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.model.dynamics import State
@@ -81,6 +81,11 @@ def end(result: Any) -> State:
     return State(*(float(result[name][-1]) for name in STATES))
 
 
+def without_inputs(start_values: dict[str, Value]) -> dict[str, Value]:
+    """The log has their columns."""
+    return {name: value for name, value in start_values.items() if name not in INPUTS}
+
+
 @pytest.mark.parametrize(
     ("preset", "start_values", "step"),
     [
@@ -101,7 +106,7 @@ def test_what_is_recorded_replays_to_the_same_bits(
     assert sorted(set(rows["time"])) == [n * h for n in range(steps + 1)]
     assert rows["time"][-1] == pytest.approx(2.4 * TIME_SCALE, abs=h)
     assert all(len(set(rows[name])) > 1 for name in ("thrust", "port_thruster", "starboard_thruster", "wind.y"))
-    replayed = simulate(log, each_fmu, preset=preset, start_values=start_values, communication_step=h)
+    replayed = simulate(log, each_fmu, preset=preset, start_values=without_inputs(start_values), communication_step=h)
     assert end(replayed) == state
     assert replayed["time"].tolist() == [n * h for n in range(steps + 1)]
 
@@ -215,7 +220,7 @@ def test_a_refused_step_is_told_and_ends_the_window_with_a_whole_record(each_fmu
         drive(run, each_fmu, record=log, recorded=logs.append, clock=Script(9.0))
     assert not pygame.display.get_init()
     assert logs == [log]
-    replayed = simulate(log, each_fmu, preset="textbook", start_values=RUNAWAY)
+    replayed = simulate(log, each_fmu, preset="textbook", start_values=without_inputs(RUNAWAY))
     assert replayed["time"][-1] == read_inputs(log)["time"][-1] > 0.0
 
 
@@ -274,6 +279,10 @@ def test_a_machine_that_cannot_keep_up_says_so_and_stays_alive(fmu: Path, tmp_pa
         (lambda: plan_drive(communication_step=2.0), "communication_step = 2.0 s: must be from 0.0001 to 1 s"),
         (lambda: drive(plan_drive(), "x.fmu", time_scale=0.0), "time_scale = 0.0: must be from 0.1 to 1000"),
         (lambda: plan_drive(start_values={"mass": -1.0}), "mass = -1.0: must be greater than 0"),
+        (
+            lambda: plan_drive(start_values={"port_thruster": 1}),
+            "port_thruster = 1: must be an input that a drive leaves",
+        ),
     ],
 )
 def test_what_cannot_be(make: Any, message: str) -> None:

@@ -2,12 +2,15 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 import hovercraft_fmu
+from hovercraft_fmu.coupling import sail_bare
 from hovercraft_fmu.host.messages import plain
 from hovercraft_fmu.scenes import SCENES, signals
 from hovercraft_fmu.simulation import plan, run_fmu, run_model
@@ -87,6 +90,15 @@ def test_a_csv_file_holds_every_bit(fmu: Path, tmp_path: Path) -> None:
         ({"start_values": {"mass": True}}, "mass = True: must be a number"),
         ({"communication_step": 1e-9}, "communication_step = 1e-09 s: must not make more than 10^8 steps"),
         ({"stop_time": 1e300}, "must not make more than 10^8 steps from 0.0 s to 1e+300 s; it makes 1e+301"),
+        (
+            {"stop_time": math.inf, "communication_step": -1.0},
+            "stop_time = inf s: must be a finite number\ncommunication_",
+        ),
+        ({"start_time": 1e15, "stop_time": 1e15 + 10.0}, "0.1 s: must not be less than what a double can tell at"),
+        (
+            {"start_values": {"thrust": 1}},
+            "thrust = 1.0: must be an input that launch leaves alone: its start value has no effect",
+        ),
         ({"start_values": {"drag_area": "round"}}, "drag_area = 'round': must be one of constant, directional"),
         ({"stop_time": 0.0}, "stop_time = 0.0 s: must be after start_time = 0.0 s"),
         ({"stop_time": math.nan}, "stop_time = nan s: must be a finite number"),
@@ -97,6 +109,33 @@ def test_bad_options(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError) as caught:  # noqa: PT011 - the message is compared below
         plan("launch", **options)
     assert message in str(caught.value)
+
+
+def test_a_result_that_does_not_fit_into_the_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before the run; by what is free now."""
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=1e6))
+    rule = (
+        r"the result of 60000 steps, \d+ columns of 8 bytes, must fit into the memory that is free; it takes [\d.]+ GB"
+    )
+    with pytest.raises(ValueError, match=f"communication_step = 0.001 s: {rule} of 0.001 GB"):
+        plan("launch", communication_step=0.001)
+    plan("launch", communication_step=0.1)
+    with pytest.raises(ValueError, match=r"communication_step = 0.05 s: the result of 80000 steps"):
+        sail_bare(communication_step=0.05)
+
+
+def test_a_loop_that_cannot_be_meant_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"communication_step = 1e-06 s: must not make more than 10\^8 steps"):
+        sail_bare(communication_step=1e-6)
+    with pytest.raises(ValueError, match=r"must not make more than 10\^8 steps from 0.0 s to 1e\+300 s"):
+        sail_bare(stop_time=1e300)
+
+
+def test_inputs_that_a_log_drives_take_no_start_value() -> None:
+    log = signals([(0.0, 5.0), (1.0, 8.0)])
+    with pytest.raises(ValueError, match=r"thrust = 2.0: must be an input that inputs leaves alone"):
+        plan(log, start_values={"thrust": 2, "wind.x": 3})
+    assert plan(log, start_values={"wind.x": 3}).signals["wind.x"].tolist() == [3.0, 3.0]
 
 
 def test_bad_files(tmp_path: Path) -> None:
@@ -125,4 +164,5 @@ def test_a_scene_without_wind_takes_the_start_value_of_the_wind() -> None:
     run = plan("launch", start_values={"wind.y": 0.2, "drag_area": "directional"}, stop_time=1.0)
     assert set(run.signals["wind.y"]) == {0.2}
     assert run_model(run)["velocity.y"][-1] > 0.0
-    assert set(plan("crosswind", start_values={"wind.y": 9.0}).signals["wind.y"]) == {0.15, 0.3}
+    with pytest.raises(ValueError, match=r"wind.y = 9.0: must be an input that crosswind leaves alone"):
+        plan("crosswind", start_values={"wind.y": 9.0})

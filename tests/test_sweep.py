@@ -348,8 +348,8 @@ RANGE = {"from": 50.0, "to": 200.0}
         ({"stop_time": "soon"}, "stop_time = 'soon': must be a finite number"),
         ({"stop_time": 0}, "stop_time = 0.0 s: must be after start_time = 0.0 s"),
         ({"set": {"frob": 3}}, "set.frob = 3: must be a variable that can be set: thrust"),
-        ({"set": {"mass": -3}}, "set.mass = -3.0: must be greater than 0"),
-        ({"set": {"mass": True}}, "set.mass = True: must be a"),
+        ({"set": {"length": -3}}, "set.length = -3.0: must be greater than 0"),
+        ({"set": {"length": True}}, "set.length = True: must be a"),
         ({"set": {"integrator": 1.5}}, "set.integrator = 1.5: must be a whole number or a name"),
         ({"stop_time": 1e300}, "must not make more than 10^8 steps"),
         ({"set": {"integrator": "magic"}}, "set.integrator = 'magic': must be one of semi_implicit_euler"),
@@ -364,7 +364,7 @@ RANGE = {"from": 50.0, "to": 200.0}
         ({"sweep": {"speed": [1.0]}}, "sweep.speed = 1.0: must be a variable that can be set"),
         ({"sweep": {"frob": RANGE}}, "must be a variable that can be set"),
         ({"sweep": {"thrust": [1.0]}}, "must be an input that turn leaves alone"),
-        ({"sweep": {"integrator": RANGE}}, "must be a list of values: the variable is no real number"),
+        ({"set": {}, "sweep": {"integrator": RANGE}}, "must be a list of values: the variable is no real number"),
         ({"sweep": {"mass": {"from": 50.0, "count": 3}}}, "sweep.mass.to: must be given"),
         ({"sweep": {"mass": {"from": 50.0, "to": 40, "count": 3}}}, "sweep.mass.to = 40.0: must be above from = 50.0"),
         ({"sweep": {"mass": {"from": 0.0, "to": 40.0, "count": 3}}}, "sweep.mass = 0.0: must be greater than 0"),
@@ -377,6 +377,8 @@ RANGE = {"from": 50.0, "to": 200.0}
         ({"sweep": {"mass": {"triangular": [3, 2, 4]}}}, "sweep.mass.triangular = [3, 2, 4]: must rise"),
         ({"sampling": {"method": "luck"}}, "sampling.method = 'luck': must be one of grid, latin_hypercube"),
         ({"sampling": {"runs": 3}}, "sampling.runs = 3: the key must be one of method"),
+        ({"set": {"thrust": 1.0}}, "set.thrust = 1.0: must be an input that turn leaves alone: its start value has no"),
+        ({"keep": {"trajectory": {"every": 1e300, "of": ["speed"]}}}, "every = 1e+300 s: must be a whole number"),
         ({"sampling": {"method": "latin_hypercube", "seed": 1}}, "sampling.runs = None: must be a whole number from 1"),
         ({"sampling": {"method": "latin_hypercube", "runs": 9}}, "sampling.seed = None: must be a whole number from 0"),
         ({"sampling": {"method": "latin_hypercube", "runs": 10**9, "seed": 1}}, "must not be more than 100000000"),
@@ -396,6 +398,43 @@ def test_a_bad_study_gets_one_clear_line(changes: dict[str, Any], message: str) 
         read_study(but(**changes))
     assert message in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_study_lists_all_its_mistakes_at_once(tmp_path: Path) -> None:
+    """Each on a line of its own, with the file; and what follows from another mistake is none."""
+    file = tmp_path / "wild.toml"
+    file.write_text("""
+        scene = "turn"
+        stop_time = -1.0
+        communication_step = 0.0
+        speed = 3
+        set = {mass = -3, port_thruster = 1, integrator = 2.7}
+        sampling = {method = "latin_hypercube", runs = 0, seed = "x"}
+        [sweep]
+        length = [20.0, 0.0, -1.0]
+        frob = [1]
+        height = [5.0]
+        thrust = [1.0]
+        width = {from = 5.0, to = 4.0, count = 1, by = 2}
+        [keep]
+        end = ["mass", "speed", "frob"]
+        distance = 1
+        events.a = {of = "nix", above = 1.0, below = 2.0}
+        trajectory = {every = "often", of = ["frob"]}
+    """)
+    with pytest.raises(ValueError, match="wild") as caught:
+        read_study(file)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(f"{file}: ") for line in lines)
+    told = [line.removeprefix(f"{file}: ").split(": must")[0].split(": the key")[0] for line in lines]
+    assert sorted(told) == sorted([
+        "speed = 3", "stop_time = -1.0 s", "communication_step = 0.0 s", "set.mass = -3.0", "set.integrator = 2.7",
+        "set.port_thruster = 1", "sampling.runs = 0", "sampling.seed = 'x'",
+        "sweep.length = 0.0", "sweep.length = -1.0",
+        "sweep.frob = 1", "sweep.thrust = [1.0]", "sweep.width.by = 2", "sweep.width.count = 1", "sweep.width.to = 4.0",
+        "keep.end = 'mass'", "keep.end = 'frob'", "keep.distance = 1", "keep.events.a.of = 'nix'", "keep.events.a",
+        "keep.trajectory.every = 'often'", "keep.trajectory.of = 'frob'",
+    ])  # fmt: skip
 
 
 def test_a_study_in_a_file(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from ..fmu.start_values import Value, start_value
 from .bare_run import run_model
 from .control_log import read_inputs
 from .fmu_run import Stepper, run_fmu, simulate, stepping
-from .planning import Inputs, Progress, Run, method_in_words, plan
+from .planning import Inputs, Progress, Run, check_effect, check_steps, method_in_words, plan
 from .points import Piece, ends, held_steps, holding, schedule
 from .result import Result, metres, path_length, write_csv
 
@@ -16,6 +16,8 @@ __all__ = [
     "Run",
     "Stepper",
     "Value",
+    "check_effect",
+    "check_steps",
     "ends",
     "held_steps",
     "holding",

@@ -1,13 +1,14 @@
 """What a run needs, checked and completed: inputs, start values, times."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from math import isfinite
+from math import ceil, isfinite, ulp
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 import numpy as np
+import psutil
 
 from ..fmu.interface import BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
 from ..fmu.start_values import Value
@@ -17,7 +18,7 @@ from ..model.dynamics import State
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..scenes import Scene, Signals, scene, signals
-from .control_log import checked_signals, read_inputs
+from .control_log import SHOWN, checked_signals, read_inputs
 
 Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
 """A scene or its name; a CSV file (a name that ends in .csv); a structured array with `time` and input names."""
@@ -105,7 +106,8 @@ def plan(
     Args:
         scene_or_inputs: see `Inputs`.
         preset: name of a craft; a scene has its own.
-        start_values: of parameters, inputs and states, by their names in the FMU; they come after the preset's.
+        start_values: of parameters, inputs and states, by their names in the FMU; they come after the preset's. Not of
+            inputs that have a column: they would have no effect.
         start_time, stop_time: s; by default the first and the last time of the inputs.
         communication_step: s; by default the scene's, else 0.01 s.
 
@@ -114,13 +116,16 @@ def plan(
     """
     chosen = _scene(scene_or_inputs)
     table = chosen.signals if chosen else _signals(cast("str | os.PathLike[str] | Signals", scene_or_inputs))
-    values = _scene_values(chosen, preset) | numbers(start_values or {})
+    given = numbers(start_values or {})
+    title = _title(chosen, scene_or_inputs)
+    check_effect(given, table.dtype.names or (), title)
+    values = _scene_values(chosen, preset) | given
     first, last = float(table["time"][0]), float(table["time"][-1])
     if len(table) == 1:
         last = first + HOVERCRAFT.stop_time
     default_step = chosen.communication_step if chosen else HOVERCRAFT.communication_step
     run = Run(
-        title=_title(chosen, scene_or_inputs),
+        title=title,
         signals=_completed(table, values),
         start_values=values,
         start_time=first if start_time is None else start_time,
@@ -174,18 +179,57 @@ def _scene_values(chosen: Scene | None, preset_name: str | None) -> dict[str, fl
     return {name: value for name, value in values.items() if name in asked or value != BY_NAME[name].start}
 
 
+def check_effect(values: Mapping[str, object], driven: Iterable[str], title: str, where: str = "") -> None:
+    """Raises ValueError where a start value is that of an input which the scene, or the log, drives; all of them."""
+    idle = [
+        f"{where}{name} = {value!r}: must be an input that {title} leaves alone: its start value has no effect"
+        for name, value in values.items()
+        if name in driven
+    ]
+    if idle:
+        raise ValueError("\n".join(idle))
+
+
 def _check_times(run: Run) -> None:
-    for name in ("start_time", "stop_time", "communication_step"):
-        value = getattr(run, name)
+    mistakes = list(_mistakes(run))
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    check_steps(run.start_time, run.stop_time, run.communication_step, 1 + len(SHOWN))
+
+
+def _mistakes(run: Run) -> Iterator[str]:
+    start, stop, step = run.start_time, run.stop_time, run.communication_step
+    for name, value in (("start_time", start), ("stop_time", stop), ("communication_step", step)):
         if not isfinite(value):
-            raise ValueError(f"{name} = {value!r} s: must be a finite number")
-    if not run.communication_step > 0.0:
-        raise ValueError(f"communication_step = {run.communication_step!r} s: must be greater than 0")
-    if not run.stop_time > run.start_time:
-        raise ValueError(f"stop_time = {run.stop_time!r} s: must be after start_time = {run.start_time!r} s")
-    steps = (run.stop_time - run.start_time) / run.communication_step
+            yield f"{name} = {value!r} s: must be a finite number"
+    if isfinite(step) and not step > 0.0:
+        yield f"communication_step = {step!r} s: must be greater than 0"
+    if isfinite(start) and isfinite(stop) and not stop > start:
+        yield f"stop_time = {stop!r} s: must be after start_time = {start!r} s"
+
+
+def check_steps(start: float, stop: float, step: float, columns: int) -> None:
+    """Raises ValueError where communication steps cannot be meant, or their result does not fit into the memory.
+
+    Args:
+        start, stop, step: s
+        columns: of the result, of 8 bytes each.
+    """
+    steps = (stop - start) / step
     if steps > MAX_STEPS:
         raise ValueError(
-            f"communication_step = {run.communication_step!r} s: must not make more than 10^8 steps from "
-            f"{run.start_time!r} s to {run.stop_time!r} s; it makes {steps:.3g}"
+            f"communication_step = {step!r} s: must not make more than 10^8 steps from {start!r} s to {stop!r} s; "
+            f"it makes {steps:.3g}"
+        )
+    late = max(start, stop, key=abs)
+    if step < ulp(late):
+        raise ValueError(
+            f"communication_step = {step!r} s: must not be less than what a double can tell at {late!r} s, "
+            f"{ulp(late)!r} s"
+        )
+    size, available = (ceil(steps) + 1) * columns * 8, psutil.virtual_memory().available
+    if size > available:
+        raise ValueError(
+            f"communication_step = {step!r} s: the result of {ceil(steps)} steps, {columns} columns of 8 bytes, must "
+            f"fit into the memory that is free; it takes {size / 1e9:.3g} GB of {available / 1e9:.3g} GB"
         )

@@ -2,12 +2,12 @@
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from math import isclose, prod
+from math import prod
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,10 @@ from ..fmu.interface import BY_NAME, INPUTS
 from ..fmu.start_values import start_value
 from ..model.craft import Craft, check_parameter
 from ..model.integrators import integrator
-from ..model.subcycling import check_step_size, check_tolerance
+from ..model.subcycling import check_step_size, check_tolerance, substeps
 from ..scenes import Signals
-from ..simulation import Run, plan, read_inputs
+from ..simulation import Run, check_effect, plan, read_inputs
+from ..simulation.planning import MAX_STEPS
 from .quantities import FORMULAS, OBSERVED, Event, Keep
 
 if sys.version_info >= (3, 11):
@@ -36,6 +37,27 @@ GRID, LATIN_HYPERCUBE = "grid", "latin_hypercube"
 SAMPLING = (GRID, LATIN_HYPERCUBE)
 MAX_RUNS = 10**8
 """Or a slip of the decimal point: the samples of a Latin hypercube are all in memory."""
+
+
+Given = ParamSpec("Given")
+Made = TypeVar("Made")
+
+
+class Mistakes(list[str]):
+    """Lines on what is wrong with a study, so that all of it is told at once."""
+
+    def tried(self, make: Callable[Given, Made], *given: Given.args, **named: Given.kwargs) -> Made | None:
+        """What is made of that, or None, and its mistakes are noted."""
+        try:
+            return make(*given, **named)
+        except ValueError as error:
+            self.extend(str(error).splitlines())
+            return None
+
+    def tell(self) -> None:
+        """Raises ValueError where there are some."""
+        if self:
+            raise ValueError("\n".join(self))
 
 
 class Distribution(NamedTuple):
@@ -116,7 +138,7 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
 
     Raises:
         OSError: no such file.
-        ValueError: one line with the file, the key, the value and the rule.
+        ValueError: all mistakes, each one line with the file, the key, the value and the rule.
     """
     if isinstance(source, Mapping):
         return _study(source, "study", Path())
@@ -130,48 +152,69 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
     try:
         return _study(table, path.stem, path.parent)
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from error
+        raise ValueError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from error
 
 
 def _study(table: Mapping[str, Any], name: str, folder: Path) -> Study:
-    _known(table, TOP, "")
+    mistakes = Mistakes()
+    mistakes.tried(_known, table, TOP, "")
+    settings, swept = (_flat(mistakes.tried(_table, table, key) or {}) for key in ("set", "sweep"))
+    sampling, kept = (mistakes.tried(_table, table, key) for key in ("sampling", "keep"))
+    source = mistakes.tried(_source, table, folder)
+    run = mistakes.tried(_plan, table, source, settings)
+    factors = [mistakes.tried(_factor, key, value, source) for key, value in swept.items()]
+    if not swept and isinstance(table.get("sweep", {}), Mapping):
+        mistakes.append("sweep: must have at least one parameter")
+    mistakes += [f"set.{key} = {value!r}: must not be swept, too" for key, value in settings.items() if key in swept]
+    right = tuple(factor for factor in factors if factor)
+    sampled = mistakes.tried(_sampled, sampling, right) if sampling is not None and right else None
+    keep = mistakes.tried(_keep, kept, run) if kept is not None else None
+    if mistakes or not (source and run and sampled and keep):
+        raise ValueError("\n".join(mistakes))
+    return Study(name, run, right, keep, *sampled, _content(table, source.log))
+
+
+class _Source(NamedTuple):
+    """What drives the inputs."""
+
+    given: str | Signals
+    """The scene's name or the inputs."""
+    title: str
+    driven: tuple[str, ...]
+    """The inputs that it drives."""
+    log: Signals | None
+
+
+def _source(table: Mapping[str, Any], folder: Path) -> _Source:
     if ("scene" in table) == ("inputs" in table):
         raise ValueError("scene: must be given, or else inputs (a control log), and not both")
-    settings, swept = _flat(_table(table, "set")), _flat(_table(table, "sweep"))
-    source, driven, log = _source(table, folder)
-    run = _plan(table, source, settings)
-    if not swept:
-        raise ValueError("sweep: must have at least one parameter")
-    factors = tuple(_factor(key, value, run, driven) for key, value in swept.items())
-    for key in settings:
-        if key in swept:
-            raise ValueError(f"set.{key} = {settings[key]!r}: must not be swept, too")
-    runs, latin = _sampled(_table(table, "sampling"), factors)
-    return Study(name, run, factors, _keep(_table(table, "keep"), run), runs, latin, _content(table, log))
-
-
-def _source(table: Mapping[str, Any], folder: Path) -> tuple[str | Signals, tuple[str, ...], Signals | None]:
-    """The scene's name or the inputs; the inputs that they drive; and the log, where there is one."""
     if "inputs" in table:
         log = read_inputs(folder / _text(table["inputs"], "inputs"))
-        return log, log.dtype.names or (), log
+        return _Source(log, "inputs", log.dtype.names or (), log)
     name = _text(table["scene"], "scene")
     if name.endswith(".csv"):
         raise ValueError(f"scene = {name!r}: must be the name of a scene; a control log is given as inputs")
     run = plan(name)
     still = {each for each in ("wind.x", "wind.y") if not run.signals[each].any()}
-    return name, tuple(each for each in INPUTS if each not in still), None
+    return _Source(name, name, tuple(each for each in INPUTS if each not in still), None)
 
 
-def _plan(table: Mapping[str, Any], source: str | Signals, settings: Mapping[str, Any]) -> Run:
+def _plan(table: Mapping[str, Any], source: _Source | None, settings: Mapping[str, Any]) -> Run | None:
+    mistakes = Mistakes()
     options: dict[str, Any] = {
-        key: _number(table[key], key) for key in ("start_time", "stop_time", "communication_step") if key in table
+        key: mistakes.tried(_number, table[key], key)
+        for key in ("start_time", "stop_time", "communication_step")
+        if key in table
     }
     if "preset" in table:
-        options["preset"] = _text(table["preset"], "preset")
-    return plan(
-        source, start_values={name: _checked(name, value, "set") for name, value in settings.items()}, **options
-    )
+        options["preset"] = mistakes.tried(_text, table["preset"], "preset")
+    values = {name: mistakes.tried(_checked, name, value, "set") for name, value in settings.items()}
+    if source:
+        mistakes.tried(check_effect, settings, source.driven, source.title, "set.")
+        right = {name: value for name, value in values.items() if value is not None and name not in source.driven}
+        run = mistakes.tried(plan, source.given, start_values=right, **options)
+    mistakes.tell()
+    return run if source else None
 
 
 def _content(table: Mapping[str, Any], log: Signals | None) -> str:
@@ -186,9 +229,11 @@ def _content(table: Mapping[str, Any], log: Signals | None) -> str:
 
 
 def _known(table: Mapping[str, Any], keys: Iterable[str], where: str) -> None:
-    for key, value in table.items():
-        if key not in keys:
-            raise ValueError(f"{where}{key} = {value!r}: the key must be one of {', '.join(keys)}")
+    Mistakes(
+        f"{where}{key} = {value!r}: the key must be one of {', '.join(keys)}"
+        for key, value in table.items()
+        if key not in keys
+    ).tell()
 
 
 def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -228,9 +273,7 @@ def _whole(value: Any, key: str, least: int) -> int:
 def _names(value: Any, key: str, known: Iterable[str]) -> tuple[str, ...]:
     if not isinstance(value, list) or len(set(map(str, value))) != len(value):
         raise ValueError(f"{key} = {value!r}: must be a list of names, each once")
-    for name in value:
-        if name not in known:
-            raise ValueError(f"{key} = {name!r}: must be one of {', '.join(known)}")
+    Mistakes(f"{key} = {name!r}: must be one of {', '.join(known)}" for name in value if name not in known).tell()
     return tuple(value)
 
 
@@ -256,17 +299,15 @@ def _checked(name: str, value: Any, where: str) -> float | int:
 # ---- what is swept
 
 
-def _factor(name: str, spec: Any, run: Run, driven: tuple[str, ...]) -> Factor:
-    if name in INPUTS and name in driven:
-        raise ValueError(
-            f"sweep.{name} = {spec!r}: must be an input that {run.title} leaves alone: its start value has no effect"
-        )
+def _factor(name: str, spec: Any, source: _Source | None) -> Factor:
+    if source:
+        check_effect({name: spec}, source.driven, source.title, "sweep.")
     if name in BY_NAME and (enumeration := BY_NAME[name].chooses):
         raise ValueError(f"sweep.{name} = {spec!r}: must be given as sweep.{enumeration}, which it stands beside")
     if isinstance(spec, list):
         if not spec:
             raise ValueError(f"sweep.{name} = []: must have at least one value")
-        return Factor(name, tuple(_checked(name, value, "sweep") for value in spec))
+        return Factor(name, _values(name, spec))
     if not isinstance(spec, Mapping):
         raise ValueError(f"sweep.{name} = {spec!r}: must be a list of values, a range or a distribution")
     if name not in BY_NAME or BY_NAME[name].start is None:
@@ -278,22 +319,37 @@ def _factor(name: str, spec: Any, run: Run, driven: tuple[str, ...]) -> Factor:
     return _range(name, spec)
 
 
+def _values(name: str, given: Iterable[Any]) -> tuple[float | int, ...]:
+    mistakes = Mistakes()
+    values = [mistakes.tried(_checked, name, value, "sweep") for value in given]
+    mistakes.tell()
+    return tuple(value for value in values if value is not None)
+
+
 def _range(name: str, spec: Mapping[str, Any]) -> Factor:
-    where = f"sweep.{name}."
-    _known(spec, ("from", "to", "count", "scale", *DISTRIBUTIONS), where)
-    for key in ("from", "to"):
-        if key not in spec:
-            raise ValueError(f"{where}{key}: must be given")
-        _checked(name, _number(spec[key], where + key), "sweep")
-    low, high, scale = float(spec["from"]), float(spec["to"]), spec.get("scale", "linear")
+    where, mistakes = f"sweep.{name}.", Mistakes()
+    mistakes.tried(_known, spec, ("from", "to", "count", "scale", *DISTRIBUTIONS), where)
+    low, high = (mistakes.tried(_bound, name, spec, key) for key in ("from", "to"))
+    count = mistakes.tried(_whole, spec["count"], where + "count", 2) if "count" in spec else None
+    scale = spec.get("scale", "linear")
     if scale not in ("linear", "log"):
-        raise ValueError(f"{where}scale = {scale!r}: must be linear or log")
-    if not low < high:
-        raise ValueError(f"{where}to = {high!r}: must be above from = {low!r}")
-    if scale == "log" and not low > 0.0:
-        raise ValueError(f"{where}from = {low!r}: must be greater than 0 where scale is log")
-    if "count" in spec:
-        count = _whole(spec["count"], where + "count", 2)
+        mistakes.append(f"{where}scale = {scale!r}: must be linear or log")
+    if low is not None and high is not None and not low < high:
+        mistakes.append(f"{where}to = {high!r}: must be above from = {low!r}")
+    if low is not None and scale == "log" and not low > 0.0:
+        mistakes.append(f"{where}from = {low!r}: must be greater than 0 where scale is log")
+    mistakes.tell()
+    return _spread(name, low, high, scale, count)
+
+
+def _bound(name: str, spec: Mapping[str, Any], key: str) -> float:
+    if key not in spec:
+        raise ValueError(f"sweep.{name}.{key}: must be given")
+    return float(_checked(name, _number(spec[key], f"sweep.{name}.{key}"), "sweep"))
+
+
+def _spread(name: str, low: Any, high: Any, scale: str, count: int | None) -> Factor:
+    if count is not None:
         spaced = np.linspace(low, high, count) if scale == "linear" else np.geomspace(low, high, count)
         return Factor(name, tuple(spaced.tolist()))
     return Factor(
@@ -324,18 +380,22 @@ def _sampled(table: Mapping[str, Any], factors: tuple[Factor, ...]) -> tuple[int
     method = table.get("method", GRID)
     if method not in SAMPLING:
         raise ValueError(f"sampling.method = {method!r}: must be one of {', '.join(SAMPLING)}")
+    mistakes = Mistakes()
     if method == GRID:
-        _known(table, ("method",), "sampling.")
-        for factor in factors:
-            if factor.distribution is not None:
-                raise ValueError(
-                    f"sweep.{factor.name}: must be a list, or a range with a count, where sampling.method is {GRID}"
-                )
+        mistakes.tried(_known, table, ("method",), "sampling.")
+        mistakes += [
+            f"sweep.{factor.name}: must be a list, or a range with a count, where sampling.method is {GRID}"
+            for factor in factors
+            if factor.distribution is not None
+        ]
+        mistakes.tell()
         return _few_enough(prod(len(factor.values) for factor in factors)), None
-    _known(table, ("method", "runs", "seed"), "sampling.")
-    runs = _few_enough(_whole(table.get("runs"), "sampling.runs", 1))
-    seed = np.random.default_rng(_whole(table.get("seed"), "sampling.seed", 0))
-    return runs, qmc.LatinHypercube(d=len(factors), seed=seed).random(runs)
+    mistakes.tried(_known, table, ("method", "runs", "seed"), "sampling.")
+    runs = mistakes.tried(_whole, table.get("runs"), "sampling.runs", 1)
+    seed = mistakes.tried(_whole, table.get("seed"), "sampling.seed", 0)
+    mistakes.tell()
+    number = _few_enough(runs or 0)
+    return number, qmc.LatinHypercube(d=len(factors), seed=np.random.default_rng(seed)).random(number)
 
 
 def _few_enough(runs: int) -> int:
@@ -347,49 +407,60 @@ def _few_enough(runs: int) -> int:
 # ---- what is kept
 
 
-def _keep(table: Mapping[str, Any], run: Run) -> Keep:
-    _known(table, ("end", "minimum", "maximum", "distance", "events", "trajectory"), "keep.")
+def _keep(table: Mapping[str, Any], run: Run | None) -> Keep:
+    mistakes = Mistakes()
+    mistakes.tried(_known, table, ("end", "minimum", "maximum", "distance", "events", "trajectory"), "keep.")
     known = (*OBSERVED, *FORMULAS)
-    end, minimum, maximum = (_names(table.get(key, []), f"keep.{key}", known) for key in ("end", "minimum", "maximum"))
+    end, minimum, maximum = (
+        mistakes.tried(_names, table.get(key, []), f"keep.{key}", known) or () for key in ("end", "minimum", "maximum")
+    )
     distance = table.get("distance", False)
     if not isinstance(distance, bool):
-        raise ValueError(f"keep.distance = {distance!r}: must be true or false")
-    events = tuple(_events(_table(table, "events"), known))
-    every, names = _trajectory(table.get("trajectory"), run, known)
-    keep = Keep(end, minimum, maximum, distance, events, every, names)
-    if not keep.columns and not names:
-        raise ValueError("keep: must name what to keep: end, minimum, maximum, distance, events or trajectory")
+        mistakes.append(f"keep.distance = {distance!r}: must be true or false")
+    specs = mistakes.tried(_table, table, "events") or {}
+    events = [mistakes.tried(_event, name, spec, known) for name, spec in specs.items()]
+    every, names = mistakes.tried(_trajectory, table.get("trajectory"), run, known) or (None, ())
+    keep = Keep(end, minimum, maximum, distance, tuple(event for event in events if event), every, names)
+    if not mistakes and not keep.columns and not names:
+        mistakes.append("keep: must name what to keep: end, minimum, maximum, distance, events or trajectory")
+    mistakes.tell()
     return keep
 
 
-def _events(table: Mapping[str, Any], known: tuple[str, ...]) -> Iterator[Event]:
-    for name, spec in table.items():
-        where = f"keep.events.{name}"
-        if not isinstance(spec, Mapping):
-            raise ValueError(f"{where} = {spec!r}: must be a table")
-        _known(spec, ("of", "above", "below", "values"), f"{where}.")
-        (of,) = _names([spec.get("of")], f"{where}.of", known)
-        if ("above" in spec) == ("below" in spec):
-            raise ValueError(f"{where}: must have above or below, one of them")
-        side = "above" if "above" in spec else "below"
-        values = _names(spec.get("values", []), f"{where}.values", known)
-        yield Event(name, of, side == "above", _number(spec[side], f"{where}.{side}"), values)
+def _event(name: str, spec: Any, known: tuple[str, ...]) -> Event:
+    where, mistakes = f"keep.events.{name}", Mistakes()
+    if not isinstance(spec, Mapping):
+        raise ValueError(f"{where} = {spec!r}: must be a table")
+    mistakes.tried(_known, spec, ("of", "above", "below", "values"), f"{where}.")
+    of = mistakes.tried(_names, [spec.get("of")], f"{where}.of", known) or ("",)
+    if ("above" in spec) == ("below" in spec):
+        mistakes.append(f"{where}: must have above or below, one of them")
+    side = "above" if "above" in spec else "below"
+    limit = mistakes.tried(_number, spec[side], f"{where}.{side}") if side in spec else None
+    values = mistakes.tried(_names, spec.get("values", []), f"{where}.values", known) or ()
+    mistakes.tell()
+    return Event(name, of[0], side == "above", limit or 0.0, values)
 
 
-def _trajectory(spec: Any, run: Run, known: tuple[str, ...]) -> tuple[float | None, tuple[str, ...]]:
+def _trajectory(spec: Any, run: Run | None, known: tuple[str, ...]) -> tuple[float | None, tuple[str, ...]]:
     if spec is None:
         return None, ()
     if not isinstance(spec, Mapping):
         raise ValueError(f"keep.trajectory = {spec!r}: must be a table")
-    _known(spec, ("every", "of"), "keep.trajectory.")
-    every = _number(spec.get("every"), "keep.trajectory.every")
-    whole = round(every / run.communication_step)
-    if whole < 1 or not isclose(whole * run.communication_step, every, rel_tol=1e-9):
-        raise ValueError(
+    mistakes = Mistakes()
+    mistakes.tried(_known, spec, ("every", "of"), "keep.trajectory.")
+    every = mistakes.tried(_number, spec.get("every"), "keep.trajectory.every")
+    if run and every is not None and not _is_whole(every, run.communication_step):
+        mistakes.append(
             f"keep.trajectory.every = {every!r} s: must be a whole number of communication steps of "
             f"{run.communication_step!r} s"
         )
-    names = _names(spec.get("of"), "keep.trajectory.of", known)
-    if not names:
-        raise ValueError("keep.trajectory.of = []: must name at least one variable")
-    return every, names
+    names = mistakes.tried(_names, spec.get("of"), "keep.trajectory.of", known)
+    if names == ():
+        mistakes.append("keep.trajectory.of = []: must name at least one variable")
+    mistakes.tell()
+    return every, names or ()
+
+
+def _is_whole(every: float, step: float) -> bool:
+    return 0.0 < every <= MAX_STEPS * step and substeps(every, step)[1] == step

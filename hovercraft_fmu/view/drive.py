@@ -15,7 +15,7 @@ from ..fmu.interface import INPUTS, STATES
 from ..fmu.start_values import Value
 from ..model.dynamics import Controls, State
 from ..scenes import signals
-from ..simulation import Run, Stepper, plan, stepping
+from ..simulation import Run, Stepper, check_effect, plan, stepping
 from .operator import PRESET, TIME_SCALE, Action, Operator, Pace
 from .window import Frame, Window, pygame
 
@@ -25,6 +25,8 @@ LONGEST_LAG = 0.25
 """s: what one frame catches up at most, and computes at most; the rest is dropped, and the drive runs slower."""
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0
 """s, of the communication step."""
+KEYED = INPUTS[1:3]
+"""The thrusters fire while their keys are held, whatever they start with."""
 HELD_KEYS: Mapping[int, Action] = {
     pygame.K_UP: Action.MORE_THRUST,
     pygame.K_DOWN: Action.LESS_THRUST,
@@ -68,6 +70,7 @@ def plan_drive(
     preset: str = PRESET, start_values: Mapping[str, Value] | None = None, communication_step: float | None = None
 ) -> Run:
     """What a drive needs, checked. Raises ValueError as `plan` does, and for an impossible craft or step."""
+    check_effect(start_values or {}, KEYED, "a drive")
     run = plan(signals([(0.0,)]), preset=preset, start_values=start_values, communication_step=communication_step)
     step = run.communication_step
     if not SHORTEST_STEP <= step <= LONGEST_STEP:
