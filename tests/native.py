@@ -41,7 +41,12 @@ NO_RAMP = Controls(0.0)
 STEPS = {"semi_implicit_euler": 0.01, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
 """s: a sub-step for each method, with which none of the scenes warns"""
 IN_TURN = dict(zip(SCENES, itertools.cycle(STEPS), strict=False))
-"""A method for every scene, where all of them with all are another test's."""
+"""A method for every scene."""
+WITH_EVERY = ("turn", "crosswind", "drift_to_rest")
+"""A plain scene, and those that have what costs a method code of its own: wind, and friction."""
+SCENES_AND_METHODS = [
+    (scene, method) for scene in SCENES for method in STEPS if scene in WITH_EVERY or method == IN_TURN[scene]
+]
 
 
 def c_compiler() -> str:

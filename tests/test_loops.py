@@ -169,17 +169,21 @@ def test_both_schemes_are_of_first_order() -> None:
 
 @pytest.mark.once
 def test_the_command_writes_what_is_committed(tmp_path: Path) -> None:
-    done = CliRunner().invoke(commands, ["measure", "coupling", "--output", str(tmp_path)])
+    """The rows that the quick one has."""
+    done = CliRunner().invoke(commands, ["measure", "coupling", "--quick", "--output", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "order in the communication step: jacobi 1.0" in done.output
     for name in ("coupling.csv", "coupling_course.csv"):
         ours, committed = (
             list(csv.reader((folder / name).read_text(encoding="utf-8").splitlines())) for folder in (tmp_path, RESULTS)
         )
-        assert [row[:-1] for row in ours] == [row[:-1] for row in committed]
-        for row, before in zip(ours[1:], committed[1:], strict=True):
+        known = {tuple(row[:-1]): row[-1] for row in committed}
+        assert ours[0] == committed[0]
+        assert len(ours) > 6
+        for *row, found in ours[1:]:
+            before = known[tuple(row)]
             if "never" not in row:  # a craft that has lost its way may be anywhere
-                assert float(row[-1]) == pytest.approx(float(before[-1]), rel=0.02), row
+                assert float(found) == pytest.approx(float(before), rel=0.02), row
     assert (tmp_path / "coupling.png").stat().st_size > 10000
 
 
@@ -203,16 +207,12 @@ def rows_of(shown: Sequence[Sequence[float]]) -> list[list[float]]:
     return [[float(value) for value in row[: len(STATES) + len(COMMANDS)]] for row in shown[1:]]
 
 
-@pytest.fixture(scope="module")
-def expected(each_fmu: Path, autopilot: Path) -> dict[str, list[list[float]]]:
-    """What our own master gives, by scheme."""
-    columns = (*STATES, *COMMANDS)
-    found = {}
-    for scheme in SCHEMES:
-        passage = sail(VOYAGE, each_fmu, autopilot, scheme=scheme, stop_time=STEPS * STEP)
-        assert passage["waypoint"][-1] == 2.0
-        found[scheme] = [[float(row[name]) for name in columns] for row in passage.data[1:]]
-    return found
+@functools.cache
+def expected(fmu: Path, autopilot: Path, scheme: str) -> list[list[float]]:
+    """What our own master gives."""
+    passage = sail(VOYAGE, fmu, autopilot, scheme=scheme, stop_time=STEPS * STEP)
+    assert passage["waypoint"][-1] == 2.0
+    return [[float(row[name]) for name in (*STATES, *COMMANDS)] for row in passage.data[1:]]
 
 
 def scheme_of(name: str) -> str:
@@ -234,14 +234,14 @@ WAYS = [
 @pytest.mark.once
 @pytest.mark.parametrize(("flavour", "name"), WAYS, indirect=["flavour"])
 def test_every_master_gives_the_bits_of_ours(
-    name: str, each_fmu: Path, autopilot: Path, expected: dict[str, list[list[float]]], tmp_path: Path, fmu: Path
+    name: str, each_fmu: Path, autopilot: Path, tmp_path: Path, fmu: Path
 ) -> None:
     if missing := HOSTS[name.split(",")[0].split(".")[0]].missing():
         pytest.skip(f"{name}: {missing}")
     rows = loop_in(name, each_fmu, autopilot, tmp_path)
     assert len(rows) == STEPS
     if name != "fmpy.ssp":
-        assert rows == expected[scheme_of(name)]
+        assert rows == expected(each_fmu, autopilot, scheme_of(name))
         return
     # fmpy.ssp sets every input to zero in its first step: then it is Jacobi
     craft = BareCraft(VOYAGE, Settings())
@@ -251,7 +251,7 @@ def test_every_master_gives_the_bits_of_ours(
         assert rows == rows_of(shown)
     else:
         assert np.array(rows) == pytest.approx(np.array(rows_of(shown)), rel=1e-9, abs=1e-9)
-    assert rows[0] != expected[JACOBI][0]
+    assert rows[0] != expected(each_fmu, autopilot, JACOBI)[0]
 
 
 # ---- SSP

@@ -54,7 +54,7 @@ def ramp(instance: Any, **rates: float) -> None:
 
 @pytest.mark.parametrize(("name", "method"), IN_TURN.items())
 def test_every_scene_is_close_to_the_bare_model(name: str, method: str, native_fmu: Path) -> None:
-    """With one of the methods; all with all are in test_native_kernel.py."""
+    """With one of the methods; more of them are in test_native_kernel.py."""
     run = holding(plan(name, start_values={"integrator": method, "step_size": STEPS[method]}))
     found, expected = run_fmu(run, native_fmu), run_model(run)
     assert found.warnings == ()

@@ -19,10 +19,9 @@ from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, MOTION, STATES
 from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, PLATFORMS, caches, compiler
 from hovercraft_fmu.fmu.native_header import constant
 from hovercraft_fmu.fmu.native_package import binary
-from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Run, held_steps, plan
 from tests.lowlevel import one
-from tests.native import C_INCLUDES, C_TESTS, STEPS, c_compiler
+from tests.native import C_INCLUDES, C_TESTS, SCENES_AND_METHODS, STEPS, c_compiler
 
 pytestmark = pytest.mark.once
 
@@ -33,11 +32,10 @@ WINE = "/usr/lib/wine/wine64"
 
 
 def runs() -> dict[str, Run]:
-    """Every scene with every method."""
+    """Every scene, every method."""
     return {
-        f"{scene}_{method}": plan(scene, start_values={"integrator": method, "step_size": step})
-        for scene in SCENES
-        for method, step in STEPS.items()
+        f"{scene}_{method}": plan(scene, start_values={"integrator": method, "step_size": STEPS[method]})
+        for scene, method in SCENES_AND_METHODS
     }
 
 
