@@ -4,14 +4,20 @@ import itertools
 import math
 from collections.abc import Callable
 from fractions import Fraction
+from pathlib import Path
 from typing import TypeAlias
 
+import fmpy
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from hovercraft_fmu.fmu.interface import STATES
 from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.model.subcycling import meant_step, rounding, substeps
+from hovercraft_fmu.scenes import Signals, signals
+from hovercraft_fmu.simulation import Result, plan, run_fmu, run_model
+from hovercraft_fmu.sweep import load, sweep
 from tests.native import Kernel, compile_c
 from tests.strategies import numbers
 
@@ -67,7 +73,7 @@ def test_a_step_means_its_sub_steps_wherever_the_time_starts(
     if host is _nanoseconds:
         size = math.ceil(size * 1e6) / 1e6  # what is no whole number of nanoseconds it cannot mean
     wanted = many * size
-    point = start if n == 1 else host(start, wanted, n - 1)
+    point = start if n == 1 and host is _sum else host(start, wanted, n - 1)
     step = host(start, wanted, n) - point
     largest = max(abs(start), abs(point), abs(point + step))
     if host is _nanoseconds:  # it takes the start for a whole number of them, too
@@ -124,3 +130,68 @@ def test_a_sum_of_steps_is_the_same_time(start: float, step: float) -> None:
         time += step
     right = Fraction(start) + steps * Fraction(step)
     assert abs(Fraction(time) - right) <= rounding(max(abs(start), abs(time)), step, steps) < step / 9
+
+
+# ---- whole runs
+
+
+def _log(start: float) -> Signals:
+    """A ramp, a jump at 3 s, a ramp; 10 s."""
+    rows = ((0.0, 5.0, 0.0), (3.0, 8.0, 0.0), (3.0, 8.0, 1.0), (10.0, 2.0, 1.0))
+    return signals((start + time, thrust, port, 0.0) for time, thrust, port in rows)
+
+
+def _assert_as_from_zero(made: Result, right: Result, start: float) -> None:
+    """The physics has no clock: 101 rows, 10 000 sub-steps of 0.001 s, and the motion of the log from 0."""
+    assert made["time"].tolist() == [start + n * 0.1 for n in range(101)]
+    assert made["substeps"][-1] == right["substeps"][-1] == 10_000
+    for name in ("pose.x", "pose.y"):
+        assert made[name] == pytest.approx(right[name], rel=0.0, abs=1e-6)
+
+
+LATE = pytest.mark.parametrize("start", [86_400.0, 1_700_000_000.0, 1e10])
+
+
+@LATE
+def test_a_log_with_the_time_of_the_day_or_of_the_epoch(start: float) -> None:
+    """Seen: 85 rows from 1 700 000 000 s and one from 1e10 s."""
+    made, right = (run_model(plan(_log(each), communication_step=0.1)) for each in (start, 0.0))
+    _assert_as_from_zero(made, right, start)
+
+
+@LATE
+def test_a_log_with_such_times_through_an_fmu(start: float, each_fmu: Path) -> None:
+    made, right = (run_fmu(plan(_log(each), communication_step=0.1), each_fmu) for each in (start, 0.0))
+    _assert_as_from_zero(made, right, start)
+
+
+@pytest.mark.usefixtures("fleet")
+@pytest.mark.parametrize("engine", ["fmu", "batch"])
+def test_a_study_with_such_times(engine: str, native_fmu: Path, tmp_path: Path) -> None:
+    ends = []
+    for start in (0.0, 1_700_000_000.0):
+        rows = "".join(",".join(map(repr, row)) + "\n" for row in _log(start).tolist())
+        (tmp_path / "log.csv").write_text("time,thrust,port_thruster,starboard_thruster\n" + rows)
+        study = {
+            "inputs": str(tmp_path / "log.csv"), "communication_step": 0.1, "sweep": {"mass": [100.0]},
+            "keep": {"end": ["pose.x"], "trajectory": {"every": 0.5, "of": ["pose.x"]}},
+        }  # fmt: skip
+        found = tmp_path / str(start)
+        sweep(study, native_fmu if engine == "fmu" else None, workers=1, output=found, engine=engine)
+        path = load(found, "trajectories")
+        assert path["time"].to_pylist() == [start + n * 0.5 for n in range(21)]
+        ends.append(path["pose.x"].to_pylist())
+    assert ends[1] == pytest.approx(ends[0], rel=0.0, abs=1e-6)
+
+
+def test_fmpy_a_day_on(each_fmu: Path) -> None:
+    """Two seconds of milliseconds: the count, and the bits of a start at 0."""
+    ends = []
+    for start in (0.0, 86_400.0):
+        made = fmpy.simulate_fmu(
+            str(each_fmu), start_time=start, stop_time=start + 2.0, output_interval=0.001,
+            start_values={"velocity.x": 0.3, "velocity.yaw_rate": 0.1}, output=[*STATES, "substeps"],
+        )  # fmt: skip
+        ends.append([made[name][-1] for name in (*STATES, "substeps")])
+    assert ends[0][-1] == 2000
+    assert ends[1] == ends[0]

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, TypeAlias
 
+from ..model.subcycling import rounding
 from .instance import Instance, Port
 from .messages import WARNING
 
@@ -85,7 +86,8 @@ def parts(
 ) -> Iterator[tuple[float, float, list[float]]]:
     """(start, end) [s] of the parts of a step, and the inputs at the middle of each; one part where they hold."""
     duration = end - time
-    n = 1 if first == last else max(1, math.ceil(duration / LONGEST_PART * (1.0 - 1e-9)))
+    longest = LONGEST_PART + rounding(max(abs(time), abs(end)), LONGEST_PART)
+    n = 1 if first == last else math.ceil(duration / longest)
     for k in range(n):
         share = (k + 0.5) / n
         middle = [a + share * (b - a) for a, b in zip(first, last, strict=True)]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.dynamics import Controls
-from ..model.subcycling import Settings, meant_step, substeps
+from ..model.subcycling import Settings, meant_step, rounding, substeps
 from ..simulation import Run, ends, schedule
 from .quantities import Keep
 
@@ -45,8 +45,10 @@ def timeline(run: Run, keep: Keep) -> Timeline:
     start = run.start_time
 
     def is_sampled(time: float) -> bool:
-        steps = (time - start) / keep.every if keep.every else 0.5
-        return abs(steps - round(steps)) <= 1e-9 * max(1.0, steps)
+        if keep.every is None:
+            return False
+        wanted = start + round((time - start) / keep.every) * keep.every
+        return abs(time - wanted) <= rounding(max(abs(start), abs(time)), run.communication_step)
 
     legs = [Leg(*piece[:4], kept=piece.is_point and (keep.watches or is_sampled(piece.end))) for piece in schedule(run)]
     legs[-1] = legs[-1]._replace(kept=True)
