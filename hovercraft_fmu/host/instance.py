@@ -42,8 +42,8 @@ class Intermediate(NamedTuple):
     """
 
     names: Sequence[str]
-    values: Callable[[float], Sequence[float]]
-    """Time [s] -> a value for each of the names. What it raises the step raises, when it is done."""
+    values: Callable[[float], Sequence[float] | None]
+    """Time [s] -> a value for each of the names; None leaves them. What it raises the step raises, when it is done."""
 
 
 class Instance:
@@ -119,7 +119,9 @@ class Instance:
         """Called by the FMU; ctypes would drop what is raised."""
         assert self._intermediate
         try:
-            self._asked.set(self._intermediate.values(time))
+            values = self._intermediate.values(time)
+            if values is not None:
+                self._asked.set(values)
         except BaseException as error:  # whatever it is: the step raises it
             self._raised = self._raised or error
 

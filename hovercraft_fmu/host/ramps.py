@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, TypeAlias
 
 from ..model.subcycling import rounding
-from .instance import Instance, Port
+from .fmu_file import Fmu
+from .instance import Instance, Intermediate, Port
 from .messages import WARNING
 
 LONGEST_PART = 0.1
@@ -14,21 +16,47 @@ Leg: TypeAlias = tuple[float, float, Sequence[float], Sequence[float], bool]
 """Start [s], end [s], the inputs at both, whether what is seen at the end is read."""
 
 
+class _Line:
+    """What inputs do in a step, for an FMU that asks for them inside it."""
+
+    def __init__(self) -> None:
+        self.time, self.first = 0.0, [0.0]
+        self.slopes: list[float] | None = None
+        """Per s; None: they hold."""
+
+    def at(self, time: float) -> list[float] | None:
+        """At a time [s]."""
+        if self.slopes is None:
+            return None
+        passed = time - self.time
+        return [value + passed * slope for value, slope in zip(self.first, self.slopes, strict=True)]
+
+
 class Ramps:
     """Steps of an instance, each with inputs that go linearly from their values at its start to those at its end.
 
-    An FMU of FMI 2.0 that can interpolate inputs is given their slopes. Any other is given the values at the middle,
-    and where they change its steps are cut into parts no longer than LONGEST_PART. Inputs that hold are set, no more.
+    An FMU of FMI 2.0 that can interpolate inputs is given their slopes, one of FMI 3.0 that asks for them inside a step
+    the values. Any other is given the values at the middle, and where they change its steps are cut into parts no
+    longer than LONGEST_PART. Inputs that hold are set, no more.
     """
 
-    def __init__(self, craft: Instance, names: Sequence[str]) -> None:
-        self.inputs = craft.port(*names)
-        self._craft = craft
+    def __init__(self, craft: Instance, names: Sequence[str], line: _Line | None) -> None:
+        self.craft, self.inputs = craft, craft.port(*names)
+        self._line = line
         self._takes_slopes = not craft.is_fmi_3 and bool(craft.description.coSimulation.canInterpolateInputs)
+
+    @classmethod
+    @contextmanager
+    def on(cls, fmu: Fmu, names: Sequence[str], ramped: bool) -> Iterator["Ramps"]:
+        """A new instance; `ramped` is whether its inputs will ever change within a step: what asks pays for it."""
+        asks = ramped and getattr(fmu.description.coSimulation, "providesIntermediateUpdate", False)
+        line = _Line() if asks else None
+        with fmu.instance(intermediate=Intermediate(names, line.at) if line else None) as craft:
+            yield cls(craft, names, line)
 
     def step(self, time: float, end: float, first: Sequence[float], last: Sequence[float]) -> None:
         """From a communication point [s] to the next. Raises SimulationError: the FMU refused a call."""
-        craft, inputs = self._craft, self.inputs
+        craft, inputs, line = self.craft, self.inputs, self._line
         if first == last:
             inputs.set(first)
             craft.step(time, end - time)
@@ -36,6 +64,13 @@ class Ramps:
             inputs.set(first)
             inputs.set_slopes(slopes(end - time, first, last))
             craft.step(time, end - time)
+        elif line:
+            inputs.set(first)
+            line.time, line.first, line.slopes = time, list(first), slopes(end - time, first, last)
+            try:
+                craft.step(time, end - time)
+            finally:
+                line.slopes = None
         else:
             for begin, until, middle in parts(time, end, first, last):
                 inputs.set(middle)
@@ -54,7 +89,7 @@ class Ramps:
             seen: variables of one type.
             rows: where what is read goes, one after the other; see `Port.over`.
         """
-        craft, inputs, do_step = self._craft, self.inputs, self._craft.function("DoStep")
+        craft, inputs, do_step = self.craft, self.inputs, self.craft.function("DoStep")
         is_fmi_3, component, row = craft.is_fmi_3, craft.component, iter(rows)
         get, references, count = seen.call
         held = None

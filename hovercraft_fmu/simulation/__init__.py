@@ -5,7 +5,7 @@ from .bare_run import run_model
 from .control_log import read_inputs
 from .fmu_run import Stepper, run_fmu, simulate, stepping
 from .planning import Inputs, Progress, Run, check_effect, check_steps, method_in_words, plan
-from .points import Piece, ends, held_steps, holding, schedule
+from .points import Piece, ends, held_steps, holding, is_ramped, schedule
 from .result import Result, metres, path_length, write_csv
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "ends",
     "held_steps",
     "holding",
+    "is_ramped",
     "method_in_words",
     "metres",
     "path_length",

@@ -11,11 +11,11 @@ import numpy as np
 from ..building import default_fmu
 from ..fmu.interface import BY_NAME, HOVERCRAFT, INPUTS
 from ..fmu.start_values import Value, start_value
-from ..host import Fmu, Instance
+from ..host import Fmu
 from ..host.ramps import Ramps
 from ..model.dynamics import Controls
 from .planning import Inputs, Progress, Run, plan
-from .points import Piece, ends
+from .points import Piece, ends, is_ramped
 from .recording import recorded
 from .result import Result
 
@@ -84,7 +84,8 @@ class Stepper:
     the FMU refuses a call.
     """
 
-    def __init__(self, craft: Instance, run: Run) -> None:
+    def __init__(self, ramps: Ramps, run: Run) -> None:
+        craft = ramps.craft
         self.messages = craft.messages
         """What the FMU has said since it was started."""
         self.port = craft.port
@@ -93,7 +94,7 @@ class Stepper:
         """fmpy's."""
         self.run = run
         """With the start values that are the FMU's own."""
-        self._craft, self._ramps = craft, Ramps(craft, INPUTS)
+        self._craft, self._ramps = craft, ramps
         self._steps = 0
 
     @property
@@ -131,8 +132,8 @@ class Stepper:
 @contextmanager
 def stepping(run: Run, fmu: str | os.PathLike[str]) -> Iterator[Stepper]:
     """An FMU, not yet started. Raises as `simulate` does."""
-    with Fmu(fmu, HOVERCRAFT.name) as opened, opened.instance() as craft:
-        yield Stepper(craft, run.on(own_starts(opened.description)))
+    with Fmu(fmu, HOVERCRAFT.name) as opened, Ramps.on(opened, INPUTS, is_ramped(run)) as ramps:
+        yield Stepper(ramps, run.on(own_starts(opened.description)))
 
 
 def own_starts(description: Any) -> dict[str, float | int]:

@@ -139,6 +139,11 @@ def schedule(run: Run) -> Iterator[Piece]:
         steps += end == regular
 
 
+def is_ramped(run: Run) -> bool:
+    """Whether inputs change but in jumps."""
+    return any(piece.first != piece.last for piece in schedule(run))
+
+
 def held_steps(run: Run) -> Iterator[tuple[float, float, Controls]]:
     """(start, end) [s] of every step for what takes inputs that hold alone, as the Python FMU and the bare model: and
     they, the values at the middle of the step where they change.

@@ -69,12 +69,15 @@ class Driver:
         folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix="hovercraft_sweep_"))
         path = Path(folder) / "swept.fmu"
         path.write_bytes(fmu)
-        self._craft = self._stack.enter_context(self._stack.enter_context(Fmu(path)).instance())
+        opened = self._stack.enter_context(Fmu(path))
+        ramped = any(leg.first != leg.last for leg in plan.timeline.legs)
+        self._ramps = self._stack.enter_context(Ramps.on(opened, INPUTS, ramped))
+        self._craft = self._ramps.craft
         self._busy, self._over = threading.Lock(), False
         self._merged = lru_cache(maxsize=16)(partial(merged, plan.timeline.legs, plan.run.start_time))
         names = tuple(dict.fromkeys((*plan.run.start_values, *swept)))
         self._shared = {name: plan.run.value(name) for name in (*names, *SETTINGS)}
-        self._start_values, self._ramps = self._craft.port(*names), Ramps(self._craft, INPUTS)
+        self._start_values = self._craft.port(*names)
         self._driven = [(i, name) for i, name in enumerate(INPUTS) if name in swept]
         self._warnings, self._read = self._craft.port("warnings"), self._craft.port(*plan.keep.read)
         self._record = np.empty((len(plan.timeline.times), len(plan.keep.read)))
