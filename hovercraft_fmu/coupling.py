@@ -160,7 +160,7 @@ def _sail(
     h = chosen.communication_step if communication_step is None else communication_step
     end = chosen.stop_time if stop_time is None else stop_time
     for name, value in (("communication_step", h), ("stop_time", end)):
-        if not 0.0 < value < math.inf:
+        if isinstance(value, bool) or not 0.0 < value < math.inf:
             raise ValueError(f"{name} = {value!r} s: must be a finite number greater than 0")
     check_steps(0.0, end, h, len(COLUMNS))
     rows = []

@@ -39,6 +39,7 @@ def test_derived_values() -> None:
         ("thrust_min", 10.5, "thrust_max"),
         ("thrust_max", -0.5, "thrust_max"),
         *((name, -1e-9, "not be negative") for name in ("skirt_friction", "gravity")),
+        *((name, True, f"{name} = True: must be a number") for name in ("mass", "drag_area")),
         *(("rotational_drag", value, "from 0 .off. to 1") for value in (-0.01, 1.01)),
         *(("drag_area", value, "must be one of 1 .constant., 2 .directional.") for value in (0, 3)),
     ],

@@ -94,6 +94,7 @@ def test_a_csv_file_holds_every_bit(fmu: Path, tmp_path: Path) -> None:
             {"stop_time": math.inf, "communication_step": -1.0},
             "stop_time = inf s: must be a finite number\ncommunication_",
         ),
+        ({"stop_time": True}, "stop_time = True s: must be a finite number"),
         ({"start_time": 1e15, "stop_time": 1e15 + 10.0}, "0.1 s: must not be less than what a double can tell at"),
         (
             {"start_values": {"thrust": 1}},

@@ -160,7 +160,9 @@ class Craft:
 def check_parameter(name: str, value: float) -> None:
     """Raises ValueError, with the name, the value and the rule, where one parameter alone is impossible."""
     rule = None
-    if not math.isfinite(value):
+    if isinstance(value, bool):
+        rule = "must be a number"
+    elif not math.isfinite(value):
         rule = "must be a finite number"
     elif name in POSITIVE and not value > 0.0:
         rule = "must be greater than 0"

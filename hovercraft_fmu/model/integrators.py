@@ -440,7 +440,7 @@ def integrator_number(name: str) -> int:
 
 def integrator(number: int) -> Integrator:
     """The method with this number. Raises ValueError with the numbers there are."""
-    if not 1 <= number <= len(INTEGRATORS):
+    if isinstance(number, bool) or number not in range(1, len(INTEGRATORS) + 1):
         known = ", ".join(f"{i} ({method.name})" for i, method in enumerate(INTEGRATORS, 1))
         raise ValueError(f"integrator = {number!r}: must be one of {known}")
-    return INTEGRATORS[number - 1]
+    return INTEGRATORS[int(number) - 1]

@@ -200,7 +200,7 @@ def _check_times(run: Run) -> None:
 def _mistakes(run: Run) -> Iterator[str]:
     start, stop, step = run.start_time, run.stop_time, run.communication_step
     for name, value in (("start_time", start), ("stop_time", stop), ("communication_step", step)):
-        if not isfinite(value):
+        if isinstance(value, bool) or not isfinite(value):
             yield f"{name} = {value!r} s: must be a finite number"
     if isfinite(step) and not step > 0.0:
         yield f"communication_step = {step!r} s: must be greater than 0"
