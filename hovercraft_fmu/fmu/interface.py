@@ -20,7 +20,7 @@ WARNINGS: Mapping[int, str] = MappingProxyType(
         COUNTER_STOPPED: "the counter of sub-steps reached its end and stopped",
         STEP_UNSTABLE: "the sub-step is too long for the drag: answers are bounded but wrong, or diverge",
         STEP_TURNS: "the craft turns too far in a sub-step: answers are wrong however stable",
-        ERROR_LOST: "the error estimate cannot be trusted: the answers are off by more than it can tell",
+        ERROR_LOST: "the error estimate cannot be trusted: the sub-step is too long to tell",
     }
 )
 """The bits of the variable `warnings`; each is logged when it is first set."""

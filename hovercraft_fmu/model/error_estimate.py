@@ -8,8 +8,8 @@ import math
 from typing import NamedTuple
 
 from .craft import Craft
-from .dynamics import Controls, State
-from .integrators import Integrator, StepTooSmallError, adaptive
+from .dynamics import Controls, State, friction_gains, friction_radius, slip_speed
+from .integrators import NEAR_REST, Integrator, StepTooSmallError, adaptive
 from .subcycling import Settings, substeps
 
 ERROR_ESTIMATES = (
@@ -24,10 +24,12 @@ TIGHTER = 32.0
 """The adaptive companion's tolerance is smaller by this: with a method of fifth order that is half the step."""
 NOT_SMALL = 0.25
 """Of the way that the craft has made: an estimate above it is none."""
-EARLY = 20
-"""Sub-steps: before that even a small error is not small beside the way."""
-FRICTION_ORDER = 2
-"""No method is of a higher one where friction stops the craft, lets it go, or turns round."""
+FEW = 20
+"""Sub-steps: before so many even a small error is not small beside the way; and where friction brings a craft to rest
+in less, both may stop at once and be off alike."""
+FRICTION_ORDER = 3
+"""No method is taken for one of a higher order where the craft rubs: between the four of RK4 while it slides and the
+two where friction stops it or lets it go. Measured, as are the numbers above: hovercraft-fmu measure error-estimate."""
 
 
 class Companion(NamedTuple):
@@ -37,9 +39,13 @@ class Companion(NamedTuple):
     """NaN: it has left the range of numbers, or found no step for its tolerance; so it stays."""
     proposed: float = 0.0
     """s: the step that the adaptive method would take next"""
+    way: float = 0.0
+    """m, of the craft itself so far, from communication point to communication point"""
+    fastest: float = 0.0
+    """m/s: its largest slip speed at one of them, where it rubs"""
 
 
-LOST = Companion(State(*[math.nan] * 6))
+LOST = State(*[math.nan] * 6)
 
 
 def check_error_estimate(number: int) -> None:
@@ -52,30 +58,43 @@ def check_error_estimate(number: int) -> None:
 def accompany(
     companion: Companion, controls: Controls, craft: Craft, communication_step: float, settings: Settings
 ) -> Companion:
-    """The companion one communication step [s] later, which the craft itself has made with these settings."""
+    """The companion one communication step [s] later, which the craft itself makes with these settings."""
     if math.isnan(companion.state.x):
         return companion
     try:
         if settings.integrator.integrate is None:
-            made = _in_two_halves(companion, controls, craft, communication_step, settings)
+            state, proposed = _in_two_halves(companion, controls, craft, communication_step, settings)
         else:
             n, h = substeps(communication_step, settings.step_size)
-            made = Companion(settings.integrator.integrate(companion.state, controls, craft, 0.5 * h, 2 * n).state)
+            state, proposed = settings.integrator.integrate(companion.state, controls, craft, 0.5 * h, 2 * n).state, 0.0
     except (ValueError, OverflowError, StepTooSmallError):  # what math.sin says of an infinite angle
-        return LOST
-    return made if all(map(math.isfinite, made.state)) else LOST
+        state, proposed = LOST, 0.0
+    return companion._replace(state=state if all(map(math.isfinite, state)) else LOST, proposed=proposed)
+
+
+def watched(companion: Companion, before: State, after: State, craft: Craft) -> Companion:
+    """With what the craft itself did in that step."""
+    dx, dy = after.x - before.x, after.y - before.y
+    way, fastest = companion.way + math.sqrt(dx * dx + dy * dy), companion.fastest
+    if craft.rubs:
+        fastest = max(fastest, _slip(before, craft), _slip(after, craft))
+    return companion._replace(way=way, fastest=fastest)
+
+
+def _slip(state: State, craft: Craft) -> float:
+    return slip_speed(state.vx, state.vy, friction_radius(craft) * state.yaw_rate)
 
 
 def _in_two_halves(
     companion: Companion, controls: Controls, craft: Craft, communication_step: float, settings: Settings
-) -> Companion:
+) -> tuple[State, float]:
     """Of the adaptive method: where its steps are as long as the communication step, its companion takes half."""
-    state, proposed = companion
+    state, proposed = companion.state, companion.proposed
     for _ in range(2):
         start = proposed or settings.step_size
         made = adaptive(state, controls, craft, 0.5 * communication_step, settings.tolerance / TIGHTER, start)
         state, proposed = made.state, made.proposed
-    return Companion(state, proposed)
+    return state, proposed
 
 
 def error_factor(method: Integrator, rubs: bool) -> float:
@@ -93,6 +112,15 @@ def estimated_error(state: State, companion: Companion, craft: Craft, method: In
     return position if position <= LARGEST else LARGEST, heading if heading <= LARGEST else LARGEST
 
 
-def is_lost(position: float, way: float, count: int) -> bool:
-    """Whether an estimate [m] can be trusted no more, after a way [m] and so many sub-steps."""
-    return position >= LARGEST or (count >= EARLY and position > NOT_SMALL * way)
+def is_lost(position: float, state: State, companion: Companion, craft: Craft, substep: float, count: int) -> bool:
+    """Whether an estimate [m] can be trusted no more, after so many sub-steps of a size [s]; 0 of the adaptive method.
+
+    Where friction has nearly stopped a craft (it could in NEAR_REST sub-steps) that it could have stopped in FEW from
+    the fastest it ever was, the companion's stop is no measure of how far that of the craft is off.
+    """
+    if position >= LARGEST or (count >= FEW and position > NOT_SMALL * companion.way):
+        return True
+    if not craft.rubs:
+        return False
+    gain, slip = max(friction_gains(craft, substep)), _slip(state, craft)
+    return slip < NEAR_REST * gain and slip < companion.fastest < FEW * gain

@@ -59,7 +59,7 @@ class Result:
         off = self["error.position"]
         share = 100.0 * off[-1] / self.distance if self.distance > 0.0 else 0.0
         if self.is_lost:
-            return "lost: off by more than can be told"
+            return "cannot be told: see the warning"
         return f"at the end {metres(off[-1])} off ({share:.2g} % of the path), at most {metres(off.max())}"
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:

@@ -148,7 +148,6 @@ static enum verdict take_up_start_values(struct instance *instance)
     now->controls = now->inputs;
     now->estimates = error_estimate == ON;
     now->companion = (struct companion){.state = now->state};
-    now->way = 0.0;
     now->reals[V_PROJECTED_AREA] = kernel_derived(&craft).projected_area;
     now->tuned = false;
     now->motion_unread = now->action_unread = true;

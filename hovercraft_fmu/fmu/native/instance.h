@@ -58,7 +58,6 @@ struct content {
     double proposed;                  /* s, the next step of the adaptive method */
     bool estimates;                   /* its own error, by a companion: */
     struct companion companion;
-    double way;                       /* m, so far, from communication point to communication point */
     double stability, rotation;       /* 1, rad: the largest of a sub-step so far */
     bool tuned;                       /* a parameter was set since the last step: the next one takes it up */
     bool motion_unread;               /* the motion in `reals` is not yet that of the communication point */

@@ -21,8 +21,8 @@ static const double UNIT = 0x1p-52;       /* relative: one or two units in the l
 static const double LARGEST = 1e300;      /* m, rad: the estimate of an error where there is none */
 static const double TIGHTER = 32.0;       /* the adaptive companion's tolerance is smaller by this */
 static const double NOT_SMALL = 0.25;     /* of the way: an error above it is lost */
-static const int32_t EARLY = 20;          /* sub-steps: before that even a small error is not small beside the way */
-static const int FRICTION_ORDER = 2;      /* no method is of a higher one where friction stops the craft */
+static const int FEW = 20;                /* sub-steps: before so many even a small error is not small beside the way */
+static const int FRICTION_ORDER = 3;      /* no method is taken for one of a higher order where the craft rubs */
 static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds what is smaller, ties to even */
 
 /* With HOVERCRAFT_LIBM the platform's functions, which Python uses, too. */
@@ -855,7 +855,7 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
 
 /* ---- error_estimate.py */
 
-static const struct companion LOST = {{NAN, NAN, NAN, NAN, NAN, NAN}, 0.0};
+static const struct state LOST = {NAN, NAN, NAN, NAN, NAN, NAN};
 
 /* Where the steps of the adaptive method are as long as the communication step, those of the companion are half. */
 static enum outcome in_two_halves(const struct companion *companion, const struct drive *drive,
@@ -891,8 +891,23 @@ void kernel_accompany(struct companion *companion, const struct drive *drive, co
             ? in_two_halves(companion, drive, craft, communication_step, settings, &stretch)
             : fixed(&companion->state, drive, craft, settings->integrator, 0.5 * made->substep, 2 * made->substeps,
                     &stretch);
-    *companion = outcome == ADVANCED && is_finite(&stretch.state) ? (struct companion){stretch.state, stretch.proposed}
-                                                                  : LOST;
+    const bool made_it = outcome == ADVANCED && is_finite(&stretch.state);
+    companion->state = made_it ? stretch.state : LOST;
+    companion->proposed = made_it ? stretch.proposed : 0.0;
+}
+
+static double slip_of(const struct state *state, const struct craft *craft)
+{
+    return slip_speed(state->vx, state->vy, kernel_friction_radius(craft).radius * state->yaw_rate);
+}
+
+void kernel_watch(struct companion *companion, const struct state *before, const struct state *after,
+                  const struct craft *craft)
+{
+    const double dx = after->x - before->x, dy = after->y - before->y;
+    companion->way = companion->way + square_root(dx * dx + dy * dy);
+    if (rubs(craft))
+        companion->fastest = larger(larger(companion->fastest, slip_of(before, craft)), slip_of(after, craft));
 }
 
 double kernel_error_factor(const struct craft *craft, int order)
@@ -912,7 +927,14 @@ struct error kernel_estimated_error(const struct state *state, const struct comp
     return (struct error){position <= LARGEST ? position : LARGEST, heading <= LARGEST ? heading : LARGEST};
 }
 
-bool kernel_is_lost(double position, double way, int32_t substeps)
+bool kernel_is_lost(double position, const struct state *state, const struct companion *companion,
+                    const struct craft *craft, double substep, int32_t count)
 {
-    return position >= LARGEST || (substeps >= EARLY && position > NOT_SMALL * way);
+    if (position >= LARGEST || (count >= FEW && position > NOT_SMALL * companion->way))
+        return true;
+    if (!rubs(craft))
+        return false;
+    const struct friction friction = friction_function(craft, substep);
+    const double gain = larger(friction.a, friction.b), slip = slip_of(state, craft);
+    return slip < NEAR_REST * gain && slip < companion->fastest && companion->fastest < FEW * gain;
 }

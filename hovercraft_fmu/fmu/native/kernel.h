@@ -84,6 +84,8 @@ enum error_estimate { OFF = 1, ON };
 struct companion {
     struct state state; /* NaN: it has left the range of numbers, or found no step for its tolerance; so it stays */
     double proposed;    /* s: the step that the adaptive method would take next */
+    double way;         /* m, of the craft itself so far, from communication point to communication point */
+    double fastest;     /* m/s: its largest slip speed at one of them, where it rubs */
 };
 
 /* How far a craft is off, by its companion. */
@@ -137,15 +139,19 @@ HIDDEN double kernel_meant_step(double time, double step, double start_time, dou
 HIDDEN enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
                                    double communication_step, const struct settings *settings, double proposed,
                                    struct stretch *stretch);
-/* The companion over the same communication step, which the craft itself has made. */
+/* The companion over the same communication step, which the craft itself has made; and what the craft did in it. */
 HIDDEN void kernel_accompany(struct companion *companion, const struct drive *drive, const struct craft *craft,
                              double communication_step, const struct settings *settings, const struct stretch *made);
+HIDDEN void kernel_watch(struct companion *companion, const struct state *before, const struct state *after,
+                         const struct craft *craft);
 /* What the difference between the two is to be multiplied by, for a method of that order. */
 HIDDEN double kernel_error_factor(const struct craft *craft, int order);
 /* By now. */
 HIDDEN struct error kernel_estimated_error(const struct state *state, const struct companion *companion,
                                            const struct craft *craft, int order);
-/* Whether such an estimate can be trusted no more, after a way [m] and so many sub-steps. */
-HIDDEN bool kernel_is_lost(double position, double way, int32_t substeps);
+/* Whether such an estimate [m] can be trusted no more, after so many sub-steps of a size [s]; 0 of the adaptive
+   method. */
+HIDDEN bool kernel_is_lost(double position, const struct state *state, const struct companion *companion,
+                           const struct craft *craft, double substep, int32_t count);
 
 #endif

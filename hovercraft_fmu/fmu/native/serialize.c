@@ -118,7 +118,8 @@ static void exchange(struct cursor *cursor, struct content *c)
     if (c->estimates) { /* that is known by the size */
         exchange_doubles(cursor, &c->companion.state, sizeof c->companion.state);
         exchange_double(cursor, &c->companion.proposed);
-        exchange_double(cursor, &c->way);
+        exchange_double(cursor, &c->companion.way);
+        exchange_double(cursor, &c->companion.fastest);
     }
     c->use = use == MODEL_EXCHANGE ? MODEL_EXCHANGE : CO_SIMULATION;
     c->phase = phase >= 0 && phase < PHASE_COUNT ? (enum phase)phase : PHASE_COUNT;

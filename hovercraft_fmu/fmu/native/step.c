@@ -3,8 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "root.h"
-
 static const double SAME_STAGE = 1e-12; /* relative: times as near as that differ by rounding alone */
 
 /* s: from a time to the next double that is larger in size. */
@@ -149,25 +147,19 @@ static enum verdict warn_of_the_step(struct instance *instance)
     return verdict;
 }
 
-/* An estimate that is not small beside the way is none, nor one that has no companion left. */
-static enum verdict warn_of_the_error(struct instance *instance)
+static enum verdict warn_of_the_error(struct instance *instance, double step)
 {
     const struct content *now = &instance->now;
+    const double substep = step < now->settings.step_size ? step : now->settings.step_size;
     const double position = instance_error(now).position;
-    if (!kernel_is_lost(position, now->way, now->integers[V_SUBSTEPS]) || !is_first(instance, ERROR_LOST))
+    const bool cut = now->settings.integrator != ADAPTIVE;
+    if (!kernel_is_lost(position, &now->state, &now->companion, &now->craft, cut ? substep : 0.0,
+                        now->integers[V_SUBSTEPS]) ||
+        !is_first(instance, ERROR_LOST))
         return FINE;
     return instance_say(instance, WARNED,
-                        "error.position = %4 m after a way of %4 m: is no estimate any more, the answers are lost; set "
-                        "a smaller %s (said once)",
-                        position, now->way, now->settings.integrator == ADAPTIVE ? "tolerance" : "step_size");
-}
-
-/* Where the craft goes, and its companion. */
-static void go_along(struct content *now, const struct companion *companion, const struct state *state)
-{
-    const double dx = state->x - now->state.x, dy = state->y - now->state.y;
-    now->companion = *companion;
-    now->way += square_root(dx * dx + dy * dy);
+                        "error.position = %4 m after a way of %4 m: cannot be trusted; set a smaller %s (said once)",
+                        position, now->companion.way, cut ? "step_size" : "tolerance");
 }
 
 /* An input that is outside its limits, and where it is held. */
@@ -307,6 +299,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     if (now->estimates) {
         companion = now->companion;
         kernel_accompany(&companion, &drive, &craft, step, &now->settings, &stretch);
+        kernel_watch(&companion, &now->state, &stretch.state, &craft);
     }
     if (instance->services.ask)
         end = inputs_at(&inquiry, step);
@@ -316,7 +309,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     if (check_watched(instance, stretch.stability, stretch.rotation) == REFUSED)
         return REFUSED;
     if (now->estimates)
-        go_along(now, &companion, &stretch.state);
+        now->companion = companion;
     now->state = stretch.state;
     now->proposed = stretch.proposed;
     now->controls = end;
@@ -331,7 +324,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     enum verdict verdict = count_substeps(instance, stretch.substeps);
     verdict = worse(verdict, warn_of_the_step(instance));
     if (now->estimates)
-        verdict = worse(verdict, warn_of_the_error(instance));
+        verdict = worse(verdict, warn_of_the_error(instance, step));
     verdict = worse(verdict, instance_warn_of_held_inputs(instance, &inquiry.start));
     return worse(verdict, instance_warn_of_held_inputs(instance, &end));
 }

@@ -5,7 +5,7 @@ from typing import Any, NoReturn
 
 from ...model.craft import Craft, check_parameter
 from ...model.dynamics import Controls, State, saturate
-from ...model.error_estimate import ON, Companion, accompany, check_error_estimate, estimated_error, is_lost
+from ...model.error_estimate import ON, Companion, accompany, check_error_estimate, estimated_error, is_lost, watched
 from ...model.integrators import Integrator, integrator
 from ...model.observation import observe_action, observe_motion
 from ...model.subcycling import (
@@ -71,7 +71,6 @@ class HovercraftSlave(Slave):
         self._proposed = 0.0  # the next step of the adaptive method
         self._stability = self._rotation = 0.0  # the largest of a sub-step so far
         self._companion: Companion | None = None  # where the error is estimated
-        self._way = 0.0  # m, so far, from communication point to communication point
 
     # ---- a step
 
@@ -87,7 +86,8 @@ class HovercraftSlave(Slave):
         if not (stability < math.inf and rotation < math.inf):
             self._refuse_watched(stability, rotation)
         if self._companion:
-            self._accompany(self._companion, controls, craft, step_size, state)
+            beside = accompany(self._companion, controls, craft, step_size, self._settings)
+            self._companion = watched(beside, self._state, state, craft)
         self._state, self._proposed = state, proposed
         self._controls, self._craft, self._tuned = controls, craft, False
         self._integers[SUBSTEPS] += n
@@ -103,7 +103,7 @@ class HovercraftSlave(Slave):
         if rotation > method.rotation_limit:
             self._warn_of_rotation(rotation, method)
         if self._companion:
-            self._warn_of_error(method)
+            self._warn_of_error(min(step_size, self._settings.step_size))
         thrust, port, starboard, _, _ = controls
         if not (craft.thrust_min <= thrust <= craft.thrust_max and 0.0 <= port <= 1.0 and 0.0 <= starboard <= 1.0):
             self._warn_of_held_inputs()
@@ -124,26 +124,21 @@ class HovercraftSlave(Slave):
             f"step_size below {step:.3g} s, or the integrator adaptive",
         )
 
-    def _accompany(self, companion: Companion, controls: Controls, craft: Craft, step_size: float, made: State) -> None:
-        """Where the craft goes with its companion."""
-        dx, dy = made.x - self._state.x, made.y - self._state.y
-        self._companion = accompany(companion, controls, craft, step_size, self._settings)
-        self._way += math.sqrt(dx * dx + dy * dy)
-
     def _error(self) -> tuple[float, float]:
         """m, rad: by its companion, at the communication point; 0 where it has none."""
         if not self._companion:
             return 0.0, 0.0
         return estimated_error(self._state, self._companion, self._craft, self._settings.integrator)
 
-    def _warn_of_error(self, method: Integrator) -> None:
-        position = self._error()[0]
-        if is_lost(position, self._way, self._integers[SUBSTEPS]):
-            setting = "step_size" if method.integrate else "tolerance"
+    def _warn_of_error(self, substep: float) -> None:
+        beside, position = self._companion, self._error()[0]
+        setting = "step_size" if self._settings.integrator.integrate else "tolerance"
+        h = substep if setting == "step_size" else 0.0
+        if beside and is_lost(position, self._state, beside, self._craft, h, self._integers[SUBSTEPS]):
             self._warn(
                 ERROR_LOST,
-                f"error.position = {position:.4g} m after a way of {self._way:.4g} m: is no estimate any more, the "
-                f"answers are lost; set a smaller {setting}",
+                f"error.position = {position:.4g} m after a way of {beside.way:.4g} m: cannot be trusted; set a "
+                f"smaller {setting}",
             )
 
     def _stop_counter(self) -> None:
@@ -222,7 +217,6 @@ class HovercraftSlave(Slave):
         self._controls = self._make_controls()
         self._state = State(*(self._given[reference] for reference in STATE_REFERENCES))
         self._companion = Companion(self._state) if self._chosen("error_estimate") == ON else None
-        self._way = 0.0
         self._tuned = False
         self._stale = True
 
@@ -249,7 +243,7 @@ class HovercraftSlave(Slave):
             "stability": self._stability,
             "rotation": self._rotation,
             "proposed": self._proposed,
-            "companion": self._companion and [*self._companion.state, self._companion.proposed, self._way],
+            "companion": self._companion and [*self._companion.state, *self._companion[1:]],
         }
 
     def _set_own_state(self, state: dict[str, Any]) -> None:
@@ -260,7 +254,5 @@ class HovercraftSlave(Slave):
         if self._started():  # else the start values are taken up, and refused, later
             self._take_up_settings()
         self._stability, self._rotation, self._proposed = state["stability"], state["rotation"], state["proposed"]
-        self._companion, self._way = None, 0.0
-        if state["companion"]:
-            *pose, proposed, self._way = state["companion"]
-            self._companion = Companion(State(*pose), proposed)
+        beside = state["companion"]
+        self._companion = Companion(State(*beside[: len(STATES)]), *beside[len(STATES) :]) if beside else None
