@@ -2,7 +2,6 @@
 
 import os
 import platform
-import re
 import shutil
 import subprocess
 import sys
@@ -74,13 +73,11 @@ def test_any_bytes_at_the_entry(tmp_path: Path) -> None:
     if missing := fuzz.missing():
         pytest.skip(missing)
     program = tmp_path / "fuzz"
-    command = ["clang", "-std=c11", "-Wall", "-Wextra", "-ffp-contract=off", *fuzz.SANITIZE, *FOLDERS,
+    command = ["clang", "-std=c11", "-Wall", "-Wextra", "-ffp-contract=off", *fuzz.SHORT, *FOLDERS,
                str(C_TESTS / "fuzz_fleet.c"), "-lm", "-o", str(program)]  # fmt: skip
     built = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (built.returncode, built.stderr) == (0, "")
-    run = [str(program), "-max_total_time=12", "-max_len=600", "-timeout=30", "-seed=1", "-print_final_stats=1"]
+    run = [str(program), "-runs=5000", "-max_len=600", "-timeout=30", "-seed=1", "-print_final_stats=1"]
     done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-5000:]
-    executed = re.search(r"number_of_executed_units: (\d+)", done.stderr)
-    assert executed
-    assert int(executed[1]) > 1000
+    assert "number_of_executed_units: 5000" in done.stderr

@@ -56,7 +56,7 @@ def test_it_would_find_a_refused_call_that_changes_something(tmp_path: Path) -> 
         chosen = f'    if (getenv("SPOILED") && !strcmp(getenv("SPOILED"), "{file}")) {{\n{early}    }}\n'
         includes = "#include <stdlib.h>\n#include <string.h>\n"
         (tmp_path / file).write_text(includes + text.replace(check, check + chosen), encoding="utf-8")
-    program = fuzz.compiled(tmp_path)
+    program = fuzz.compiled(tmp_path, options=fuzz.DEMANDS_ALONE)
     for file in SPOILED:
         with pytest.raises(AssertionError, match=FINDINGS.get(file, FOUND)):
             fuzz.fuzz(program, "-runs=1000000", SPOILED=file)  # it ends when it has found it, everywhere at the same

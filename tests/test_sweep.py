@@ -560,29 +560,34 @@ def test_a_chunk_has_a_bounded_size(engine: str, keep: dict[str, Any], native_fm
 
 
 @pytest.mark.once
-@pytest.mark.parametrize("flavour", ["python", "native3"], indirect=True)
-def test_the_bits_do_not_depend_on_who_makes_the_runs(each_fmu: Path, tmp_path: Path) -> None:
+def test_the_bits_do_not_depend_on_who_makes_the_runs(fmu: Path, native3_fmu: Path, tmp_path: Path) -> None:
     """In this process; on two processes of a cluster on loopback, which get the FMU by content: its file is gone."""
     import distributed
 
-    study = but(FAILING, keep={"distance": True, "trajectory": {"every": 15.0, "of": ["pose.x"]}})
-    sweep(study, each_fmu, workers=1, output=tmp_path / "here")
-    copy = tmp_path / "copy.fmu"
-    copy.write_bytes(each_fmu.read_bytes())
     cluster = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1"}
     with distributed.LocalCluster(**cluster, dashboard_address="127.0.0.1:0") as there:
-        address = there.scheduler_address
-        outcome = sweep(
-            study, copy, scheduler=address, output=tmp_path / "there", tell=lambda _: copy.unlink(missing_ok=True)
-        )
-        assert not copy.exists()
-        with distributed.Client(address, set_as_default=False) as client:
-            left = client.run(_drivers)
-            assert list(left.values()) == [0, 0]  # every instance was freed
+        for path in (fmu, native3_fmu):
+            assert_the_bits_are_those_of(there.scheduler_address, path, tmp_path / path.stem)
+
+
+def assert_the_bits_are_those_of(scheduler: str, fmu: Path, folder: Path) -> None:
+    import distributed
+
+    study = but(FAILING, keep={"distance": True, "trajectory": {"every": 15.0, "of": ["pose.x"]}})
+    sweep(study, fmu, workers=1, output=folder / "here")
+    copy = folder / "copy.fmu"
+    copy.write_bytes(fmu.read_bytes())
+    outcome = sweep(
+        study, copy, scheduler=scheduler, output=folder / "there", tell=lambda _: copy.unlink(missing_ok=True)
+    )
+    assert not copy.exists()
+    with distributed.Client(scheduler, set_as_default=False) as client:
+        left = client.run(_drivers)
+        assert list(left.values()) == [0, 0]  # every instance was freed
     assert (outcome.new, outcome.failed) == (6, 4)
     for what in ("runs", "trajectories"):
-        here = bits(load(tmp_path / "here", what))
-        assert bits(load(tmp_path / "there", what)).equals(here)
+        here = bits(load(folder / "here", what))
+        assert bits(load(folder / "there", what)).equals(here)
 
 
 def _drivers() -> int:
