@@ -9,16 +9,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from hovercraft_fmu import simulate
-from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, STATES
+from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES
 from hovercraft_fmu.fmu.start_values import Value
 from hovercraft_fmu.scenes import SCENES, Signals, signals
-from hovercraft_fmu.simulation import plan, points, read_inputs, run_fmu, run_model, schedule
+from hovercraft_fmu.simulation import holding, plan, points, read_inputs, run_fmu, run_model, schedule
 from hovercraft_fmu.sweep import load, sweep
 from tests.conftest import FLAVOURS
 from tests.reference import reference_loads
@@ -81,6 +82,27 @@ def test_a_scene_ends_on_its_solution(end: Any, way: str) -> None:
             off = math.dist(end(name, step)[:2], right[:2])
             print(f"\n{name:10} {way:8} {step or SCENES[name].communication_step} s: {off:.1e} m", end="")
             assert off <= bound, (name, step)
+
+
+def test_what_holding_costs_is_that_of_the_readme(native_fmu: Path) -> None:
+    """77 m on ice, with steps of 0.1 s."""
+    ended = run_fmu(holding(plan("ice", start_values=RK4)), native_fmu)
+    assert math.dist((ended["pose.x"][-1], ended["pose.y"][-1]), solved("ice")[:2]) == pytest.approx(77.1, abs=0.1)
+
+
+def test_the_way_out_of_the_readme(native_fmu: Path) -> None:
+    """fmpy alone, with two rows for each interval, both with the value at its middle."""
+    run = plan("ice", start_values=RK4)
+    points = np.linspace(0.0, 240.0, 2401)
+    middles = np.zeros(4800, run.signals.dtype)
+    middles["time"] = np.repeat(points, 2)[1:-1]
+    for name in INPUTS:
+        values = np.interp(0.5 * (points[1:] + points[:-1]), run.signals["time"], run.signals[name])
+        middles[name] = np.repeat(values, 2)
+    ended = fmpy.simulate_fmu(
+        str(native_fmu), input=middles, start_values=dict(run.start_values), stop_time=240.0, output_interval=0.1
+    )
+    assert math.dist((ended["pose.x"][-1], ended["pose.y"][-1]), solved("ice")[:2]) < 1e-3
 
 
 def test_friction_errs_as_its_method_does(end: Any) -> None:

@@ -24,6 +24,8 @@ from hovercraft_fmu.studies.reference_end import reference_end
 from hovercraft_fmu.studies.step_costs import OURS, PLAIN, Loops
 from hovercraft_fmu.studies.work_precision import (
     ACCURACIES,
+    HELD,
+    MIDDLE,
     Setting,
     fitted,
     holding_costs,
@@ -68,9 +70,11 @@ def test_observed_orders() -> None:
     assert orders["drift_to_rest", "rk4"] == pytest.approx(2.0, abs=0.4)  # coarse steps; tests/test_terms.py is sharper
 
 
-def test_holding_costs_a_first_order() -> None:
-    holding = holding_costs()
-    assert fitted(holding["communication_step"], holding["position_error"]) == pytest.approx(1.0, abs=0.1)
+def test_holding_costs_a_first_order_and_the_middle_a_second() -> None:
+    found = holding_costs(["slalom"])
+    for given, order in ((HELD, 1.0), (MIDDLE, 2.0)):
+        own = found.filter(given=given)
+        assert fitted(own["communication_step"], own["position_error"]) == pytest.approx(order, abs=0.1)
 
 
 def test_a_millimetre_on_turn() -> None:
