@@ -165,7 +165,10 @@ def of_an_fmu(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--stop-time", type=float, metavar="S", help="Default: the last time of the inputs.")
 @click.option("--communication-step", type=float, metavar="S", help="Default: the scene's, or 0.01 s.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
-@click.option("--output", type=PathOf(path_type=Path), metavar="FILE.csv", help="Write all columns.")
+@click.option(
+    "--output", type=PathOf(path_type=Path), metavar="FILE.csv",
+    help="Write all columns; as --input the file gives the same motion again.",
+)  # fmt: skip
 @click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png", help="Draw the run.")
 @click.option(
     "--animate", "animation", type=PathOf(path_type=Path), metavar="FILE.gif|FILE.html",
@@ -192,7 +195,7 @@ def simulate_command(
     list_scenes: bool,
     **options: Any,
 ) -> None:
-    """Run the FMU through fmpy: a named scene, or a control log.
+    """Run the FMU over a named scene, or a control log; between communication points, too, inputs go as they are there.
 
     FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there.
     """
@@ -217,6 +220,9 @@ def simulate_command(
         check_animation(animation)
     _make_room(output, plot, animation)
     runs = [plan(inputs, start_values=each, **options) for each in (start_values, *others)]
+    if len(runs[0].signals) == 1 and options["stop_time"] is None:
+        duration = runs[0].stop_time - runs[0].start_time
+        OUTPUT.print(f"{runs[0].title} has one row: it holds for the default duration, {duration:g} s (--stop-time)")
     path = _named(fmu, kind)
     results = [_simulated(run, path) for run in runs]
     for result in results:

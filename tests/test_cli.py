@@ -168,6 +168,26 @@ def test_simulate_a_control_log(shell: Shell) -> None:
     assert "3 s, 300 communication steps" in shell.ok("simulate", "--input", "log.csv", "--preset", "ice")
 
 
+@pytest.mark.usefixtures("native_at_hand")
+def test_what_is_written_is_read_and_gives_the_same_motion(shell: Shell) -> None:
+    options = ("--preset", "ice", "--communication-step", "0.5", "--set", "integrator=rk4")
+    (shell.folder / "log.csv").write_text("time,thrust,port_thruster\n0,5,0\n3.3,8,1\n3.3,2,1\n7.2,2,0\n")
+    first = shell.ok("simulate", "--input", "log.csv", *options, "--output", "result.csv")
+    again = shell.ok("simulate", "--input", "result.csv", *options, "--output", "again.csv")
+    found, expected = (each.partition("duration")[2].partition("wrote")[0] for each in (again, first))
+    assert found == expected != ""
+    assert (shell.folder / "result.csv").read_bytes() == (shell.folder / "again.csv").read_bytes()
+
+
+@pytest.mark.usefixtures("native_at_hand")
+def test_one_row_holds_and_says_so(shell: Shell) -> None:
+    (shell.folder / "log.csv").write_text("time,thrust\n5,10\n")
+    printed = shell.ok("simulate", "--input", "log.csv", "--communication-step", "1")
+    assert "log.csv has one row: it holds for the default duration, 60 s" in printed
+    assert "60 s, 60 communication steps" in printed
+    assert "one row" not in shell.ok("simulate", "--input", "log.csv", "--stop-time", "6")
+
+
 def test_list_scenes(shell: Shell) -> None:
     printed = shell.ok("simulate", "--list-scenes")
     assert all(f"\n{name} " in printed for name in SCENES)

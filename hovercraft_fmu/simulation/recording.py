@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..fmu.interface import INPUTS
 from ..model.dynamics import Controls
@@ -26,27 +27,53 @@ def recorded(
         go: makes a piece.
         see: reads the columns.
     """
-    rows: list[tuple[float, ...]] = []
-    asked: list[Controls] = []
-    points: list[bool] = []
-
-    def keep(time: float, inputs: Controls, seen: Sequence[float], is_point: bool) -> None:
-        rows.append((time, *seen))
-        asked.append(inputs)
-        points.append(is_point)
-
+    rows = _Rows(columns)
     start, end = ends(run)
-    time, seen = run.start_time, see()
-    keep(time, start, seen, is_point=True)
+    seen = see()
+    rows.add(run.start_time, start, seen, is_point=True)
     for piece in schedule(run):
-        if piece.first != asked[-1]:
-            keep(time, piece.first, seen, is_point=False)
+        if piece.first != rows.inputs:
+            rows.add(piece.time, piece.first, seen, is_point=False)
         go(piece)
-        time, seen = piece.end, see()
-        keep(time, piece.last, seen, piece.is_point)
-    if end != asked[-1]:
-        keep(time, end, seen, is_point=False)
-    whole = np.array(rows, dtype=[("time", np.float64), *columns])
-    for name, values in zip(INPUTS, zip(*asked, strict=True), strict=True):
-        whole[name] = values
-    return Result(whole[points], run, whole=whole)
+        seen = see()
+        rows.add(piece.end, piece.last, seen, piece.is_point)
+    if end != rows.inputs:
+        rows.add(piece.end, end, seen, is_point=False)
+    whole = rows.whole()
+    return Result(whole[rows.points], run, whole=whole)
+
+
+CHUNK = 4096
+"""Rows: numbers of Python take four times the room of numpy's."""
+
+
+class _Rows:
+    """Rows of a result as they come."""
+
+    def __init__(self, columns: Sequence[tuple[str, Any]]) -> None:
+        self._type = np.dtype([("time", np.float64), *columns])
+        self._places = [self._type.names.index(name) for name in INPUTS] if self._type.names else []
+        self._chunks: list[NDArray[np.void]] = []
+        self._rows: list[tuple[float, ...]] = []
+        self.inputs = Controls()
+        """Of the last row."""
+        self.points: list[bool] = []
+        """Which rows are communication points."""
+
+    def add(self, time: float, inputs: Controls, seen: Sequence[float], is_point: bool) -> None:
+        row = [time, *seen]
+        for place, value in zip(self._places, inputs, strict=True):
+            row[place] = value
+        self._rows.append(tuple(row))
+        self.points.append(is_point)
+        self.inputs = inputs
+        if len(self._rows) == CHUNK:
+            self._pack()
+
+    def _pack(self) -> None:
+        self._chunks.append(np.array(self._rows, self._type))
+        self._rows = []
+
+    def whole(self) -> NDArray[np.void]:
+        self._pack()
+        return np.concatenate(self._chunks)
