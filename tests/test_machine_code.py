@@ -24,8 +24,9 @@ def nothing_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def one_platform(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Instead of all, which take long."""
+    """And one library, instead of all, which take long."""
     monkeypatch.setattr(machine_code, "PLATFORMS", {"x86_64-linux": PLATFORMS["x86_64-linux"]})
+    monkeypatch.setattr(machine_code, "libraries", lambda: [library(NATIVE)])
 
 
 def files_of(folder: Path) -> set[str]:

@@ -196,7 +196,7 @@ def speed_of(state: State, craft: Craft) -> float:
     return max(math.hypot(state.vx, state.vy), abs(craft.drag_center * state.yaw_rate))
 
 
-FIRST_STEPS = (0.02, 0.5, 1.5, 3.0, 30.0, 1e3, 1e6)
+FIRST_STEPS = (0.02, 1.5, 30.0, 1e6)
 """Dimensionless."""
 UNITS = 30
 """Of the motion's own time, that it runs on; a communication point after each."""
@@ -411,6 +411,7 @@ def test_without_drag_and_force_the_motion_is_uniform(method: Any) -> None:
 
 
 @EVERY
+@settings(max_examples=40)
 @given(
     st.lists(st.sampled_from([0.0, TINY, -TINY, 1e-310, -1e-200, 1e-160, 1.0]), min_size=4, max_size=4),
     st.sampled_from([0.0, TINY, 1e-308]),

@@ -73,7 +73,7 @@ def test_a_run_has_the_bits_of_simulate(scene: str, each_fmu: Path, tmp_path: Pa
     """At every communication point, whatever was run on the instance before."""
     study = {
         "scene": scene,
-        "stop_time": 8.0,
+        "stop_time": 4.0,
         "set": {"step_size": 0.01},
         "sweep": {"mass": [60.0, 170.0], "integrator": [method.name for method in INTEGRATORS]},
         "keep": {"trajectory": {"every": 0.1, "of": list(OBSERVED)}},
@@ -82,7 +82,7 @@ def test_a_run_has_the_bits_of_simulate(scene: str, each_fmu: Path, tmp_path: Pa
     paths = load(tmp_path, "trajectories")
     for row in rows(load(tmp_path)):
         settings = {"step_size": 0.01, "mass": row["mass"], "integrator": row["integrator"]}
-        alone = simulate(scene, each_fmu, start_values=settings, stop_time=8.0)
+        alone = simulate(scene, each_fmu, start_values=settings, stop_time=4.0)
         own = paths.filter(pc.equal(paths["run"], row["run"]))
         for name in ("time", *OBSERVED):
             assert np.array_equal(own[name].to_numpy(), alone[name]), (row, name)
@@ -189,7 +189,7 @@ def test_the_batch_has_the_rows_of_the_native_fmu(
     """Bit by bit: every method at once, all that can be kept, at every communication point, and only at the end."""
     study = {
         "scene": scene,
-        "stop_time": 15.0,
+        "stop_time": 8.0,
         "set": {"step_size": 0.02},
         "sweep": {"integrator": [method.name for method in INTEGRATORS], **sweeps},
         "keep": {
