@@ -9,19 +9,31 @@ if TYPE_CHECKING:
     from .building import build
     from .host import SimulationError
     from .host.fleet import Crafts, advance_fleet
-    from .simulation import Result, simulate
+    from .simulation import Advice, Result, advise, simulate
 
 _HOMES = {
+    "Advice": "simulation",
     "Crafts": "host.fleet",
     "Result": "simulation",
     "SimulationError": "host",
     "advance_fleet": "host.fleet",
+    "advise": "simulation",
     "build": "building",
     "simulate": "simulation",
 }
 """Where each name is from: a module is loaded when something of it is asked for, as most take others with them."""
 
-__all__ = ["Crafts", "Result", "SimulationError", "__version__", "advance_fleet", "build", "simulate"]
+__all__ = [
+    "Advice",
+    "Crafts",
+    "Result",
+    "SimulationError",
+    "__version__",
+    "advance_fleet",
+    "advise",
+    "build",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -37,7 +37,7 @@ from .view.tables import markdown
 if TYPE_CHECKING:
     from .building import Kind, Product
     from .coupling import Passage
-    from .simulation import Inputs, Result, Run
+    from .simulation import Advice, Inputs, Result, Run
     from .validation import Check
 
 FOLDER = Path("build")
@@ -231,6 +231,46 @@ def simulate_command(
     if animation:
         _animate(results, animation)
     return None
+
+
+@commands.command("advise")
+@of_an_fmu
+@click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
+@click.option("--input", "log", metavar="FILE.csv", type=PathOf(path_type=Path), help="A control log.")
+@click.option("--within", type=float, metavar="M", default=0.01, show_default=True,
+              help="How far the position may be off, in metres, at every communication point.")  # fmt: skip
+@click.option("--preset", metavar="NAME", help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--communication-step", type=float, metavar="S", help="Default: the scene's, or 0.01 s.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+def advise_command(
+    fmu: Path | None,
+    kind: "Kind | None",
+    scene: str | None,
+    log: Path | None,
+    settings: tuple[str, ...],
+    **options: Any,
+) -> None:
+    """Say which method and sub-step are the cheapest that keep a scene within a wanted error.
+
+    FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there. Each setting is run with
+    the FMU's own estimate of its error; what is advised is checked with one reference run.
+    """
+    from .simulation import advise
+
+    if scene and log:
+        raise click.UsageError("--scene and --input: must not be given together")
+    path, inputs = _named(fmu, kind), log or scene or "launch"
+    with _progress(1.0, "trying settings") as tell:
+        advice = advise(inputs, path, start_values=_settings(settings), tell=tell, **options)
+    _print_advice(advice)
+    words = ["hovercraft-fmu", "simulate", *([str(path)] if fmu else [])]
+    words += ["--input", str(log)] if log else ["--scene", str(inputs)]
+    for name, value in options.items():
+        words += [f"--{name.replace('_', '-')}", str(value)] if value is not None and name != "within" else []
+    chosen = [*settings, *(f"{name}={value}" for name, value in advice.best.start_values.items())]
+    OUTPUT.print(f"to run it:\n  {shlex.join([*words, *(word for each in chosen for word in ('--set', each))])}")
+    if not advice.is_met:
+        raise click.ClickException(f"no setting stays within {advice.within:g} m; that is the best there is")
 
 
 @commands.command("drive")
@@ -629,6 +669,25 @@ def _print_result(result: "Result") -> None:
     _print_rows(f"{run.title}: {run.method}", rows)
     for warning in result.warnings:
         OUTPUT.print(f"warning: {warning}")
+
+
+def _print_advice(advice: "Advice") -> None:
+    from .simulation import metres
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "setting", "sub-steps", "loads", "time", "off, as told", "off a reference run"):
+        table.add_column(title)
+    for what, tried in (("best", advice.best), ("runner-up", advice.runner_up)):
+        if tried:
+            table.add_row(what, tried.words, f"{tried.substeps}", f"{tried.loads}", f"{1e3 * tried.seconds:.3g} ms",
+                          metres(tried.told), metres(tried.true))  # fmt: skip
+    run = advice.run
+    OUTPUT.print(f"{run.title}, {run.stop_time - run.start_time:g} s: at most {metres(advice.within)} off")
+    OUTPUT.print(table)
+    OUTPUT.print(
+        f"a host that holds the inputs over communication steps of {run.communication_step:g} s is "
+        f"{metres(advice.held)} off, whatever the method"
+    )
 
 
 def _write(result: "Result", output: Path | None, plot: Path | None) -> None:

@@ -1,6 +1,7 @@
 """Plans a scene, or inputs of your own, and runs it: on an FMU, or on the bare model; one kind of result."""
 
 from ..fmu.start_values import Value, start_value
+from .advice import WITHIN, Advice, Tried, advise
 from .bare_run import run_model
 from .control_log import read_inputs
 from .fmu_run import Stepper, run_fmu, simulate, stepping
@@ -9,13 +10,17 @@ from .points import Piece, ends, held_steps, holding, is_ramped, schedule
 from .result import Result, metres, path_length, write_csv
 
 __all__ = [
+    "WITHIN",
+    "Advice",
     "Inputs",
     "Piece",
     "Progress",
     "Result",
     "Run",
     "Stepper",
+    "Tried",
     "Value",
+    "advise",
     "check_effect",
     "check_steps",
     "ends",

@@ -1,0 +1,77 @@
+"""What is advised: the cheapest setting that keeps the wanted error, checked by exact solutions."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hovercraft_fmu import Advice, advise, simulate
+from hovercraft_fmu.model.dynamics import State
+from hovercraft_fmu.model.integrators import INTEGRATORS
+from hovercraft_fmu.scenes import Scene, held
+from tests.shell import Shell
+
+COAST = Scene("coast", "", held(10.0, (0.0, 0.0, 0.0, 0.0)), start=State(vx=2.0), communication_step=0.5)
+STAGES = {method.name: method.stages for method in INTEGRATORS}
+
+
+def exact(times: np.ndarray) -> np.ndarray:
+    """x = ln(1 + kappa*v0*t)/kappa."""
+    kappa = COAST.craft.drag_factor / COAST.craft.mass
+    return np.asarray(np.log1p(kappa * 2.0 * times) / kappa)
+
+
+@pytest.fixture(scope="module")
+def advice(native_fmu: Path) -> Advice:
+    return advise(COAST, native_fmu, within=1e-4)
+
+
+def test_the_advice_is_right_and_what_is_coarser_is_not(advice: Advice, native_fmu: Path) -> None:
+    """What is coarser is off or warned of; and what the advice says of its error is what the exact solution says."""
+    best = advice.best
+    assert advice.is_met
+    name, coarser = ("tolerance", 10.0) if "tolerance" in best.start_values else ("step_size", 2.5)
+    for factor, met in ((1.0, True), (coarser, False)):
+        setting = {**best.start_values, name: factor * float(best.start_values[name])}
+        result = simulate(COAST, native_fmu, start_values=setting)
+        off = float(np.abs(result["pose.x"] - exact(result["time"])).max())
+        assert (off <= advice.within and not result.warnings) == met
+        if met:
+            assert best.true == pytest.approx(off, abs=1e-9)
+            assert best.told == pytest.approx(off, rel=0.2)
+            assert best.loads == best.substeps * STAGES[str(best.start_values["integrator"])]
+
+
+def test_the_runner_up_is_another_method_that_costs_more(advice: Advice) -> None:
+    other = advice.runner_up
+    assert other is not None
+    assert other.start_values["integrator"] != advice.best.start_values["integrator"]
+    assert other.loads >= advice.best.loads
+    assert max(other.told, other.true) <= advice.within
+    assert min(other.seconds, advice.best.seconds) > 0.0
+
+
+def test_what_holding_the_inputs_costs(native_fmu: Path) -> None:
+    """A ramp of a = 0.5 N/s over n = 10 steps of H = 1 s, without drag: a*H^3/m*(n*(n - 1)/4 + n/6) behind."""
+    rows = ((0.0, 0.0, 0.0, 0.0), (10.0, 5.0, 0.0, 0.0))
+    ramp = Scene("ramp", "", rows, parameters={"drag_coefficient": 0.0}, communication_step=1.0)
+    assert advise(ramp, native_fmu).held == pytest.approx(0.5 / 100.0 * (90.0 / 4.0 + 10.0 / 6.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("within", [0.0, -1.0, math.nan, math.inf])
+def test_an_impossible_wish_is_refused(within: float, native_fmu: Path) -> None:
+    with pytest.raises(ValueError, match=f"within = {within!r} m: must be a finite number greater than 0"):
+        advise(COAST, native_fmu, within=within)
+
+
+@pytest.mark.usefixtures("native_at_hand")
+def test_the_command_gives_the_command(shell: Shell) -> None:
+    (shell.folder / "log.csv").write_text("time,thrust\n0,5\n3,5\n")
+    printed = shell.ok("advise", "--input", "log.csv", "--within", "0.001", "--communication-step", "0.5")
+    assert "log.csv, 3 s: at most 1 mm off" in printed
+    shell.ok(*printed.splitlines()[-1].split()[1:])
+    refused = shell.run("advise", "--input", "log.csv", "--within", "1e-300", "--communication-step", "0.5")
+    assert refused.status == 1
+    assert refused.err == "hovercraft-fmu: no setting stays within 1e-300 m; that is the best there is\n"
+    assert "to run it:" in refused.out
