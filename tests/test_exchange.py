@@ -285,7 +285,7 @@ def test_an_input_outside_its_limits_is_told_once(instance: Any, messages: list[
 # ---- what is read
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(craft=crafts, state=rounded_states, held=rounded_controls)
 def test_all_that_is_read_follows_states_and_inputs_at_once(
     craft: Craft, state: State, held: Controls, shared: tuple[Any, list[str]]
@@ -338,7 +338,7 @@ OPERATIONS = st.one_of(
 )
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(operations=st.lists(OPERATIONS, min_size=4, max_size=30))
 def test_any_sequence_of_states_inputs_saves_and_restores(
     operations: list[tuple[str, Any]], shared: tuple[Any, list[str]]

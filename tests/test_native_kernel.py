@@ -102,7 +102,7 @@ SLOW = st.builds(State, heading=numbers(-4.0, 4.0), vx=AT_OR_NEAR_REST, vy=AT_OR
 CRAFT_AND_STATE = st.one_of(st.tuples(crafts, states), st.tuples(calm_crafts, states), st.tuples(RUBBING, SLOW))
 
 
-@settings(max_examples=500)
+@settings(max_examples=300)
 @given(
     craft_and_state=CRAFT_AND_STATE,
     held=controls,
@@ -318,7 +318,7 @@ def test_the_logarithm(shipped: Kernel) -> None:
 # ---- numbers in messages
 
 
-@settings(max_examples=2000)
+@settings(max_examples=1000)
 @given(value=st.floats())
 def test_numbers_read_as_in_python(value: float, text: Text) -> None:
     assert text.real("%r", value) == repr(value)

@@ -115,7 +115,7 @@ def assert_close(found: NDArray[np.float64], expected: NDArray[np.float64]) -> N
     assert np.abs(found - expected).max() <= 1e-11 * scale
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(craft=crafts, state=rounded_states, held=rounded_controls)
 def test_partial_derivatives_are_those_of_the_model(
     craft: Craft, state: State, held: Controls, shared: tuple[Any, list[str]]
@@ -125,7 +125,7 @@ def test_partial_derivatives_are_those_of_the_model(
     assert_close(jacobian(instance), by_complex_steps(state, held, craft))
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(craft=st.one_of(crafts, rubbing_crafts), state=rounded_states, held=rounded_controls)
 def test_partial_derivatives_in_co_simulation(craft: Craft, state: State, held: Controls, stepped: Any) -> None:
     """At a communication point, with the inputs that are set there: those of the step to come."""
@@ -154,7 +154,7 @@ def assert_initially_close(instance: Any, state: State, held: Controls, craft: C
     assert_close(jacobian(instance, INITIAL_UNKNOWNS, INITIAL_KNOWNS) * wholes, expected * wholes)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(craft=crafts, state=rounded_states, held=rounded_controls)
 def test_partial_derivatives_in_initialization_mode(
     craft: Craft, state: State, held: Controls, shared: tuple[Any, list[str]]
@@ -166,7 +166,7 @@ def test_partial_derivatives_in_initialization_mode(
     assert_initially_close(instance, state, held, craft)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(craft=st.one_of(crafts, rubbing_crafts), state=rounded_states, held=rounded_controls)
 def test_partial_derivatives_in_initialization_mode_of_co_simulation(
     craft: Craft, state: State, held: Controls, stepped: Any
