@@ -61,7 +61,7 @@ class PathOf(click.Path):
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command and leave the process: status 0, or 1 after one line that says what is wrong."""
+    """Run the command and leave the process: status 0, or 1 after a line for each thing that is wrong."""
     try:
         status = commands.main(arguments, prog_name="hovercraft-fmu", standalone_mode=False)
     except click.exceptions.Abort:
@@ -69,7 +69,7 @@ def main(arguments: list[str] | None = None) -> None:
     except click.ClickException as error:
         sys.exit(f"hovercraft-fmu: {error.format_message()}")
     except EXPECTED as error:
-        sys.exit("hovercraft-fmu: " + _one_line(error))
+        sys.exit("\n".join(f"hovercraft-fmu: {line}" for line in getattr(error, "mistakes", (_one_line(error),))))
     except RuntimeError as error:
         from .host import SimulationError
 

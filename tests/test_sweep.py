@@ -437,6 +437,16 @@ def test_a_study_lists_all_its_mistakes_at_once(tmp_path: Path) -> None:
     ])  # fmt: skip
 
 
+def test_the_command_tells_each_mistake_on_a_line(tmp_path: Path, shell: Shell) -> None:
+    file = tmp_path / "bad.toml"
+    file.write_text('scene = "turn"\nset.mass = -1\nsweep.length = [0.0]\nkeep.end = ["speed"]\n')
+    lines = shell.run("sweep", str(file)).err.splitlines()
+    assert [line.split(": must")[0] for line in lines] == [
+        f"hovercraft-fmu: {file}: set.mass = -1.0",
+        f"hovercraft-fmu: {file}: sweep.length = 0.0",
+    ]
+
+
 def test_a_study_in_a_file(tmp_path: Path) -> None:
     file = tmp_path / "blown.toml"
     file.write_text(

@@ -33,6 +33,18 @@ MAX_STEPS = 10**8
 """Communication steps of a run: a year at 0.3 s, or a slip of the decimal point."""
 
 
+NUMBER = 32
+"""Bytes of one while a run is recorded: a float of Python's, and its place in a row. In the array they are 8."""
+
+
+class MistakesError(ValueError):
+    """Several things are wrong: one a line."""
+
+    def __init__(self, mistakes: Iterable[str]) -> None:
+        self.mistakes = tuple(mistakes)
+        super().__init__("\n".join(self.mistakes))
+
+
 def method_in_words(integrator: str, step_size: float, tolerance: float) -> str:
     """'rk4, 0.1 s'; of the adaptive method it is the tolerance that drives the accuracy."""
     return f"{integrator}, " + (f"tolerance {tolerance:g}" if integrator == "adaptive" else f"{step_size:g} s")
@@ -187,13 +199,13 @@ def check_effect(values: Mapping[str, object], driven: Iterable[str], title: str
         if name in driven
     ]
     if idle:
-        raise ValueError("\n".join(idle))
+        raise MistakesError(idle)
 
 
 def _check_times(run: Run) -> None:
     mistakes = list(_mistakes(run))
     if mistakes:
-        raise ValueError("\n".join(mistakes))
+        raise MistakesError(mistakes)
     check_steps(run.start_time, run.stop_time, run.communication_step, 1 + len(SHOWN))
 
 
@@ -213,7 +225,7 @@ def check_steps(start: float, stop: float, step: float, columns: int) -> None:
 
     Args:
         start, stop, step: s
-        columns: of the result, of 8 bytes each.
+        columns: of the result.
     """
     steps = (stop - start) / step
     if steps > MAX_STEPS:
@@ -227,9 +239,9 @@ def check_steps(start: float, stop: float, step: float, columns: int) -> None:
             f"communication_step = {step!r} s: must not be less than what a double can tell at {late!r} s, "
             f"{ulp(late)!r} s"
         )
-    size, available = (ceil(steps) + 1) * columns * 8, psutil.virtual_memory().available
+    size, available = (ceil(steps) + 1) * columns * NUMBER, psutil.virtual_memory().available
     if size > available:
         raise ValueError(
-            f"communication_step = {step!r} s: the result of {ceil(steps)} steps, {columns} columns of 8 bytes, must "
-            f"fit into the memory that is free; it takes {size / 1e9:.3g} GB of {available / 1e9:.3g} GB"
+            f"communication_step = {step!r} s: the result of {ceil(steps)} steps, {columns} numbers of {NUMBER} bytes "
+            f"each, must fit into the memory that is free; it takes {size / 1e9:.3g} GB of {available / 1e9:.3g} GB"
         )

@@ -21,7 +21,7 @@ from ..model.integrators import integrator
 from ..model.subcycling import check_step_size, check_tolerance, substeps
 from ..scenes import Signals
 from ..simulation import Run, check_effect, plan, read_inputs
-from ..simulation.planning import MAX_STEPS
+from ..simulation.planning import MAX_STEPS, MistakesError
 from .quantities import FORMULAS, OBSERVED, Event, Keep
 
 if sys.version_info >= (3, 11):
@@ -57,7 +57,7 @@ class Mistakes(list[str]):
     def tell(self) -> None:
         """Raises ValueError where there are some."""
         if self:
-            raise ValueError("\n".join(self))
+            raise MistakesError(self)
 
 
 class Distribution(NamedTuple):
@@ -152,7 +152,7 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
     try:
         return _study(table, path.stem, path.parent)
     except ValueError as error:
-        raise ValueError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from error
+        raise MistakesError(f"{path}: {line}" for line in str(error).splitlines()) from error
 
 
 def _study(table: Mapping[str, Any], name: str, folder: Path) -> Study:
@@ -170,7 +170,7 @@ def _study(table: Mapping[str, Any], name: str, folder: Path) -> Study:
     sampled = mistakes.tried(_sampled, sampling, right) if sampling is not None and right else None
     keep = mistakes.tried(_keep, kept, run) if kept is not None else None
     if mistakes or not (source and run and sampled and keep):
-        raise ValueError("\n".join(mistakes))
+        raise MistakesError(mistakes)
     return Study(name, run, right, keep, *sampled, _content(table, source.log))
 
 
