@@ -76,12 +76,7 @@ class Ramps:
                 inputs.set(middle)
                 craft.step(begin, until - begin)
 
-    def follow(
-        self,
-        legs: Iterable[tuple[float, float, Sequence[float], Sequence[float], bool]],
-        seen: Port,
-        rows: Iterable[Any],
-    ) -> None:
+    def follow(self, legs: Iterable[Leg], seen: Port, rows: Iterable[Any]) -> None:
         """Many steps, with what is asked again and again asked once: so they cost what their calls through ctypes cost.
 
         Args:

@@ -33,6 +33,8 @@ def simulate(
 ) -> Result:
     """Run a scene, or inputs of your own, on the FMU.
 
+    Between communication points, too, inputs go as they were asked for: linear, with jumps and bends where these are.
+
     Args:
         scene_or_inputs: see `Inputs`.
         fmu: the file; without it the native FMU in build/ under the current folder, which is built if it is not there.

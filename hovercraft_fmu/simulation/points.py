@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import fmpy
@@ -29,11 +30,6 @@ class Piece(NamedTuple):
     """to here, at its end, before a jump there."""
     is_point: bool
     """Whether a communication point is at its end: a regular one, a jump, or the end of the run."""
-
-    @property
-    def duration(self) -> float:
-        """s."""
-        return self.end - self.time
 
 
 class _Knot(NamedTuple):
@@ -80,6 +76,11 @@ class _Inputs:
             if not left == knot.before == knot.after == right
         ]
         return busy or knots[:1]
+
+    @property
+    def are_ramped(self) -> bool:
+        """Whether they ever change but in jumps."""
+        return any(left.after != right.before for left, right in pairwise(self._knots))
 
     def next_knot(self, time: float) -> _Knot | None:
         """The next one after a time [s]."""
@@ -141,7 +142,7 @@ def schedule(run: Run) -> Iterator[Piece]:
 
 def is_ramped(run: Run) -> bool:
     """Whether inputs change but in jumps."""
-    return any(piece.first != piece.last for piece in schedule(run))
+    return _Inputs(run).are_ramped
 
 
 def held_steps(run: Run) -> Iterator[tuple[float, float, Controls]]:

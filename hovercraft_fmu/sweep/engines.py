@@ -19,7 +19,7 @@ from ..host.ramps import Ramps
 from ..model.dynamics import Controls
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
-from ..simulation import Run
+from ..simulation import Run, is_ramped
 from .quantities import Keep, Record, Samples
 from .timeline import Leg, Timeline, merged
 
@@ -70,8 +70,7 @@ class Driver:
         path = Path(folder) / "swept.fmu"
         path.write_bytes(fmu)
         opened = self._stack.enter_context(Fmu(path))
-        ramped = any(leg.first != leg.last for leg in plan.timeline.legs)
-        self._ramps = self._stack.enter_context(Ramps.on(opened, INPUTS, ramped))
+        self._ramps = self._stack.enter_context(Ramps.on(opened, INPUTS, is_ramped(plan.run)))
         self._craft = self._ramps.craft
         self._busy, self._over = threading.Lock(), False
         self._merged = lru_cache(maxsize=16)(partial(merged, plan.timeline.legs, plan.run.start_time))
