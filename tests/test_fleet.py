@@ -34,6 +34,8 @@ TERMS: dict[str, dict[str, float]] = {
     "wind": {},
 }
 
+SLOPES = {"held": Controls(0.0), "thrusters": Controls(0.7, 0.2, -0.1), "wind": Controls(0.7, 0.2, -0.1, 0.05, 0.0)}
+
 
 @pytest.fixture(scope="module")
 def kernel(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
@@ -76,12 +78,11 @@ def assert_alike(found: Any, expected: list[tuple[str, Any]], before: list[State
 
 @EVERY
 @pytest.mark.parametrize("term", TERMS)
-@pytest.mark.parametrize("ramped", [False, True])
-def test_each_craft_has_the_bits_of_the_native_fmu(term: str, method: str, ramped: bool, kernel: Kernel) -> None:
+@pytest.mark.parametrize("slope", SLOPES.values(), ids=SLOPES)
+def test_each_craft_has_the_bits_of_the_native_fmu(term: str, method: str, slope: Controls, kernel: Kernel) -> None:
     states, controls, crafts = drawn(43, seed=len(term), **TERMS[term])
     if term == "wind":
         controls = [each._replace(wind_x=0.2, wind_y=-0.1) for each in controls]
-    slope = Controls(0.7, 0.2, -0.1, 0.05, 0.0) if ramped else Controls(0.0)
     way = Settings(STEPS[method], METHODS[method], 1e-6)
     found = advance_fleet(columns(states), columns(controls), crafts, 0.73, way, slope)
     expected = [

@@ -134,7 +134,7 @@ def advance_fleet(
     """Many craft, each one communication step later, with the bits of the native FMU; Python's lock is released.
 
     A row of `float64`, whatever its strides, is read where it is; nothing is written into what is given. Eight craft go
-    side by side where drag is plain (no wind, constant area, no friction, no rotational drag, no slopes) and the method
+    side by side where drag is plain (no wind, constant area, no friction, no rotational drag) and the method
     semi-implicit Euler or RK4; the others one after the other.
 
     Args:

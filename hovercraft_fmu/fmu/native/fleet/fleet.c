@@ -8,111 +8,6 @@
 
 #include "kernel.c"
 
-/* ---- side by side */
-
-enum { LANES = 8 };
-typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
-typedef int64_t bits __attribute__((vector_size(LANES * sizeof(int64_t))));
-
-static const int64_t SIGN = INT64_MIN;
-
-/* Of a stretch, so far; `fastest` is the largest q [m/s], left and right are the least and the largest yaw rate. */
-struct lane_states {
-    lanes x, y, heading, vx, vy, yaw_rate;
-    lanes fastest, left, right;
-};
-
-/* Of struct load_function, what plain drag needs. */
-struct push {
-    lanes x_d, drag, turning_drag, thrust, side, turn;
-};
-
-static ALWAYS_INLINE lanes largest(lanes a, lanes b)
-{
-    const bits beyond = b > a;
-    return (lanes)((beyond & (bits)b) | (~beyond & (bits)a));
-}
-
-static ALWAYS_INLINE lanes least(lanes a, lanes b)
-{
-    const bits beyond = b < a;
-    return (lanes)((beyond & (bits)b) | (~beyond & (bits)a));
-}
-
-static ALWAYS_INLINE lanes root(lanes a)
-{
-#if defined(__clang__) && __clang_major__ >= 18
-    return __builtin_elementwise_sqrt(a);
-#else
-    for (int i = 0; i < LANES; i++)
-        a[i] = square_root(a[i]);
-    return a;
-#endif
-}
-
-static ALWAYS_INLINE bool any(const bits *mask)
-{
-    int64_t all = 0;
-    for (int i = 0; i < LANES; i++)
-        all |= (*mask)[i];
-    return all != 0;
-}
-
-/* Not in line: large angles, and those very close to a multiple of pi/2. */
-static __attribute__((noinline)) void of_rare(const bits *rare, const lanes *angle, lanes *sine, lanes *cosine)
-{
-    for (int i = 0; i < LANES; i++)
-        if ((*rare)[i]) {
-            struct trig_turn turn = {.quarters = 0.0};
-            const struct trig_pair pair = trig_sine_cosine((*angle)[i], &turn);
-            (*sine)[i] = pair.sine;
-            (*cosine)[i] = pair.cosine;
-        }
-}
-
-#define LANE(name) lanes_##name
-#include "lanes.h"
-#undef LANE
-
-/* Once more for newer processors, which have them four at a time. */
-#if defined(__x86_64__) && !defined(FLEET_BASELINE)
-#include <cpuid.h>
-
-#if defined(__clang__)
-#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
-#else
-#pragma GCC push_options
-#pragma GCC target("avx2")
-#endif
-#define LANE(name) wide_##name
-#include "lanes.h"
-#undef LANE
-#if defined(__clang__)
-#pragma clang attribute pop
-#else
-#pragma GCC pop_options
-#endif
-
-/* Whether processor and system have AVX2. */
-static bool is_wide(void)
-{
-    unsigned a, b, c, d, low, high;
-    const unsigned system_saves = 1u << 27, avx = 1u << 28, avx2 = 1u << 5, registers = 6;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & system_saves) || !(c & avx))
-        return false;
-    __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
-    return (low & registers) == registers && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & avx2);
-}
-#else
-#define wide_semi_implicit_euler lanes_semi_implicit_euler
-#define wide_rk4 lanes_rk4
-
-static bool is_wide(void)
-{
-    return false;
-}
-#endif
-
 /* ---- one craft of the fleet */
 
 static double of(const struct column *column, int64_t i)
@@ -252,92 +147,235 @@ static bool advance_alone(const struct fleet *fleet, const struct way *way, cons
     return settle(fleet, reached, i, (enum refusal)outcome, &stretch);
 }
 
-/* ---- a block of them */
+/* ---- a block of craft, side by side */
+
+enum { BLOCK = 8 };
+/* The rows of a block: the parts of a state, and, of the stretch so far, the largest q [m/s], the least and the largest
+   yaw rate; of struct load_function what plain drag needs; and what `steer` needs. */
+enum { FASTEST = COMPONENTS, LEFT, RIGHT, MOTION };
+enum { X_D, DRAG, TURNING_DRAG, THRUST, SIDE, TURN, PUSH };
+enum { HELM = 12 };
 
 struct block {
+    const struct fleet *fleet;
     int filled;
+    bool rk4;
+    bool varies;            /* the controls, of each */
     int64_t n;              /* sub-steps, of each */
-    int64_t craft[LANES];
-    double h[LANES];
-    struct state states[LANES];
-    struct load_function loads[LANES];
+    int64_t number[BLOCK];  /* in the fleet */
+    double h[BLOCK], k[BLOCK], drag_rate[BLOCK];
+    double motion[MOTION][BLOCK], push[PUSH][BLOCK], helm[HELM][BLOCK];
+    double stability[BLOCK], rotation[BLOCK]; /* at the least: of what the scalar kernel has done */
 };
+
+static void put_rows(double (*rows)[BLOCK], int n, int lane, const double *values)
+{
+    for (int k = 0; k < n; k++)
+        rows[k][lane] = values[k];
+}
+
+static struct state state_in(const struct block *block, int lane)
+{
+    double y[COMPONENTS];
+    for (int k = 0; k < COMPONENTS; k++)
+        y[k] = block->motion[k][lane];
+    return state_of(y);
+}
+
+static void put_state_in(struct block *block, int lane, const struct state *state)
+{
+    double y[COMPONENTS];
+    components_of(state, y);
+    put_rows(block->motion, COMPONENTS, lane, y);
+}
+
+static struct load_function loads_on(const struct drive *drive, const struct craft *craft, bool rk4, double h)
+{
+    const double time = rk4 ? 1.0 : h;
+    return load_function(drive, craft, time / craft->mass, time / craft->inertia);
+}
+
+/* After so many sub-steps it is seen whether an angle was rare. */
+enum { SOME = 8 };
+
+static int64_t some_more(const struct block *block, int64_t from)
+{
+    return block->n - from < SOME ? block->n : from + SOME;
+}
+
+static void watch_too(struct block *block, int lane, const struct stretch *stretch)
+{
+    block->stability[lane] = larger(block->stability[lane], stretch->stability);
+    block->rotation[lane] = larger(block->rotation[lane], stretch->rotation);
+}
+
+/* By the scalar kernel, from the state that is in the block, and the loads at the end. */
+static void again(struct block *block, int64_t from, int64_t to, int lane)
+{
+    const struct drive drive = drive_at(block->fleet, block->number[lane]);
+    const struct craft craft = craft_at(block->fleet, block->number[lane]);
+    const double h = block->h[lane];
+    struct load_function f = loads_on(&drive, &craft, block->rk4, h);
+    struct state state = state_in(block, lane);
+    for (int64_t i = from; i < to; i++) {
+        f.begun = (double)i * h;
+        const struct stretch one = block->rk4 ? smooth_rk4(&state, &f, h, 1) : semi_implicit_euler(&state, &f, h, 1);
+        watch_too(block, lane, &one);
+        state = one.state;
+    }
+    struct watch watch = {0.0, state.yaw_rate, state.yaw_rate};
+    const struct stretch end = stretch_of(&f, &state, 0, h, &watch);
+    watch_too(block, lane, &end);
+    put_state_in(block, lane, &state);
+}
+
+/* The lanes whose bit is set. */
+static __attribute__((noinline)) void substeps_again(struct block *block, int64_t from, int64_t to, unsigned which)
+{
+    for (int lane = 0; lane < BLOCK; lane++)
+        if (which & 1u << lane)
+            again(block, from, to, lane);
+}
+
+static const int64_t SIGN = INT64_MIN;
+
+/* With the registers that every processor has, RK4 goes best four at a time, the default eight at a time. */
+#define LANES 4
+#define LANE(name) four_##name
+#include "lanes.h"
+#undef LANES
+#undef LANE
+#define LANES 8
+#define LANE(name) eight_##name
+#include "lanes.h"
+#undef LANE
+
+/* Once more for newer processors. */
+#if defined(__x86_64__) && !defined(FLEET_BASELINE)
+#include <cpuid.h>
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#endif
+#define LANE(name) wide_##name
+#include "lanes.h"
+#undef LANE
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+/* Whether processor and system have AVX2. */
+static bool is_wide(void)
+{
+    unsigned a, b, c, d, low, high;
+    const unsigned system_saves = 1u << 27, avx = 1u << 28, avx2 = 1u << 5, registers = 6;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & system_saves) || !(c & avx))
+        return false;
+    __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+    return (low & registers) == registers && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & avx2);
+}
+#else
+#define wide_semi_implicit_euler eight_semi_implicit_euler
+#define wide_rk4 eight_rk4
+
+static bool is_wide(void)
+{
+    return false;
+}
+#endif
+
+/* ---- a block of them */
 
 /* Put craft i into the block; false where it is not one that goes side by side with those that are there. */
 static bool joins(struct block *block, const struct fleet *fleet, const struct way *way, int64_t i)
 {
-    const bool euler = way->integrator == SEMI_IMPLICIT_EULER;
+    const int lane = block->filled;
+    const bool rk4 = way->integrator == RK4;
     const double step = of(&way->communication_step, i);
     int64_t n;
     double h;
-    if ((!euler && way->integrator != RK4) || !are_numbers(fleet, i) || !is_way(way, i) || step == 0.0 ||
-        !substeps(step, of(&way->step_size, i), &n, &h) || (block->filled > 0 && n != block->n))
+    if ((!rk4 && way->integrator != SEMI_IMPLICIT_EULER) || !are_numbers(fleet, i) || !is_way(way, i) || step == 0.0 ||
+        !substeps(step, of(&way->step_size, i), &n, &h))
         return false;
     const struct drive drive = drive_at(fleet, i);
     const struct craft craft = craft_at(fleet, i);
-    const double time = euler ? h : 1.0;
-    const struct load_function f = load_function(&drive, &craft, time / craft.mass, time / craft.inertia);
-    if (drive.varies || rubs(&craft) || f.kind != PLAIN_DRAG)
+    const struct load_function f = loads_on(&drive, &craft, rk4, h);
+    if (rubs(&craft) || f.kind != PLAIN_DRAG || (lane > 0 && (n != block->n || drive.varies != block->varies)))
         return false;
-    const int lane = block->filled++;
+    const struct state state = state_at(fleet, i);
+    const double push[PUSH] = {f.x_d, f.drag, f.turning_drag, f.thrust, f.side, f.turn};
+    const double helm[HELM] = {drive.start.thrust, drive.start.port, drive.start.starboard, drive.rate.thrust,
+                               drive.rate.port, drive.rate.starboard, craft.thrust_min, craft.thrust_max,
+                               craft.steering_force, thruster_moment(&craft), f.per_mass, f.per_inertia};
+    const double watched[] = {0.0, state.yaw_rate, state.yaw_rate};
+    block->fleet = fleet;
+    block->filled++;
+    block->rk4 = rk4;
+    block->varies = drive.varies;
     block->n = n;
-    block->craft[lane] = i;
+    block->number[lane] = i;
     block->h[lane] = h;
-    block->states[lane] = state_at(fleet, i);
-    block->loads[lane] = f;
+    block->k[lane] = f.k;
+    block->drag_rate[lane] = f.drag_rate;
+    block->stability[lane] = block->rotation[lane] = 0.0;
+    put_state_in(block, lane, &state);
+    put_rows(&block->motion[FASTEST], MOTION - FASTEST, lane, watched);
+    put_rows(block->push, PUSH, lane, push);
+    put_rows(block->helm, HELM, lane, helm);
     return true;
 }
 
-#define EACH(lane_values, member) \
-    for (int each = 0; each < LANES; each++) \
-    (lane_values)[each] = (member)
-
-static void load(const struct block *block, struct push *f, struct lane_states *z, lanes *h)
+static void repeat(double (*rows)[BLOCK], int n, int lane)
 {
-    EACH(f->x_d, block->loads[each].x_d);
-    EACH(f->drag, block->loads[each].drag);
-    EACH(f->turning_drag, block->loads[each].turning_drag);
-    EACH(f->thrust, block->loads[each].thrust);
-    EACH(f->side, block->loads[each].side);
-    EACH(f->turn, block->loads[each].turn);
-    EACH(z->x, block->states[each].x);
-    EACH(z->y, block->states[each].y);
-    EACH(z->heading, block->states[each].heading);
-    EACH(z->vx, block->states[each].vx);
-    EACH(z->vy, block->states[each].vy);
-    EACH(z->yaw_rate, block->states[each].yaw_rate);
-    EACH(z->fastest, 0.0);
-    z->left = z->right = z->yaw_rate;
-    EACH(*h, block->h[each]);
+    for (int k = 0; k < n; k++)
+        rows[k][lane] = rows[k][0];
 }
 
-/* Carry out a block; how many of its craft were refused. Lanes that are not filled have what the first has. */
-static int64_t advance_block(struct block *block, const struct fleet *fleet, const struct way *way,
-                             const struct reached *reached, bool wide)
+/* A lane that is not filled has what the first has. */
+static void fill(struct block *block, int lane)
 {
-    struct push f;
-    struct lane_states z;
-    lanes h;
-    int64_t refused = 0;
-    for (int lane = block->filled; lane < LANES; lane++) {
-        block->states[lane] = block->states[0];
-        block->loads[lane] = block->loads[0];
-        block->h[lane] = block->h[0];
-    }
-    load(block, &f, &z, &h);
-    if (way->integrator == RK4)
-        (wide ? wide_rk4 : lanes_rk4)(&f, &h, block->n, &z);
+    block->number[lane] = block->number[0];
+    repeat(&block->h, 1, lane);
+    repeat(block->motion, MOTION, lane);
+    repeat(block->push, PUSH, lane);
+    repeat(block->helm, HELM, lane);
+}
+
+static void carry_out(struct block *block, bool wide)
+{
+    if (wide)
+        (block->rk4 ? wide_rk4 : wide_semi_implicit_euler)(block, 0);
+    else if (!block->rk4)
+        eight_semi_implicit_euler(block, 0);
     else
-        (wide ? wide_semi_implicit_euler : lanes_semi_implicit_euler)(&f, &h, block->n, &z);
+        for (int first = 0; first < block->filled; first += 4)
+            four_rk4(block, first);
+}
+
+/* How many of its craft were refused. */
+static int64_t advance_block(struct block *block, const struct fleet *fleet, const struct reached *reached,
+                             bool wide)
+{
+    int64_t refused = 0;
+    for (int lane = block->filled; lane < BLOCK; lane++)
+        fill(block, lane);
+    carry_out(block, wide);
     for (int i = 0; i < block->filled; i++) {
+        double (*const z)[BLOCK] = block->motion;
+        const double h = block->h[i];
         struct stretch made = {
-            .state = {z.x[i], z.y[i], z.heading[i], z.vx[i], z.vy[i], z.yaw_rate[i]},
+            .state = state_in(block, i),
             .substeps = block->n,
-            .stability = h[i] * (block->loads[i].k * z.fastest[i] * block->loads[i].drag_rate),
-            .rotation = h[i] * larger(z.right[i], -z.left[i]),
-            .substep = h[i],
+            .stability = larger(block->stability[i], h * (block->k[i] * z[FASTEST][i] * block->drag_rate[i])),
+            .rotation = larger(block->rotation[i], h * larger(z[RIGHT][i], -z[LEFT][i])),
+            .substep = h,
         };
-        refused += settle(fleet, reached, block->craft[i], (enum refusal)checked(&made), &made);
+        refused += settle(fleet, reached, block->number[i], (enum refusal)checked(&made), &made);
     }
     block->filled = 0;
     return refused;
@@ -383,14 +421,14 @@ int64_t fleet_advance(const struct fleet *fleet, const struct way *way, const st
     int64_t refused = 0;
     for (int64_t i = 0; i < fleet->count; i++) {
         if (joins(&block, fleet, way, i)) {
-            if (block.filled == LANES)
-                refused += advance_block(&block, fleet, way, reached, wide);
+            if (block.filled == BLOCK)
+                refused += advance_block(&block, fleet, reached, wide);
         } else {
             refused += advance_alone(fleet, way, reached, i);
         }
     }
     if (block.filled > 0)
-        refused += advance_block(&block, fleet, way, reached, wide);
+        refused += advance_block(&block, fleet, reached, wide);
     environment_leave(&host);
     return refused;
 }
