@@ -19,6 +19,7 @@ from hovercraft_fmu.model.integrators import INTEGRATORS, Integrator, integrator
 from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Value, simulate
+from hovercraft_fmu.sweep import load, sweep
 from hovercraft_fmu.view.animation import Track
 from tests.lowlevel import another, count, get, kept, one, put, reference, start
 from tests.shell import Shell
@@ -326,3 +327,31 @@ def test_where_it_is_lost_the_words_say_so(native_fmu: Path) -> None:
     }  # fmt: skip
     result = simulate("launch", native_fmu, start_values=start_values, stop_time=40.0, communication_step=1.0)
     assert result.error_in_words == "cannot be told: see the warning"
+
+
+# ---- a sweep
+
+
+def test_a_sweep_keeps_it(native_fmu: Path, tmp_path: Path) -> None:
+    study: dict[str, Any] = {
+        "scene": "turn",
+        "stop_time": 20.0,
+        "set": {"error_estimate": "on", "integrator": "drag_implicit"},
+        "sweep": {"step_size": [0.1, 0.05]},
+        "keep": {"end": ["error.position"], "maximum": ["error.heading"]},
+    }
+    sweep(study, native_fmu, workers=1, output=tmp_path)
+    table = load(tmp_path)
+    for row, step in zip(table.to_pylist(), (0.1, 0.05), strict=True):
+        alone = simulate("turn", native_fmu, stop_time=20.0, start_values=study["set"] | {"step_size": step})
+        assert row["end.error.position"] == alone["error.position"][-1]
+        assert row["maximum.error.heading"] == alone["error.heading"].max()
+
+
+@pytest.mark.parametrize("place", ["set", "sweep"])
+def test_the_batch_tells_no_error(place: str, tmp_path: Path) -> None:
+    study: dict[str, Any] = {"scene": "turn", "sweep": {"mass": [90.0, 100.0]}, "keep": {"end": ["error.position"]}}
+    study |= {"set": {"error_estimate": "on"}} if place == "set" else {}
+    study["sweep"] |= {"error_estimate": ["off", "on"]} if place == "sweep" else {}
+    with pytest.raises(ValueError, match="error_estimate: must be off with the engine batch"):
+        sweep(study, engine="batch", output=tmp_path)

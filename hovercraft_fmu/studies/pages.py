@@ -23,7 +23,7 @@ from ..fmu.archive import digest
 from ..fmu.document import FOLDER as PACKED
 from ..fmu.document import rendered
 from ..fmu.extras import RESULT
-from ..fmu.interface import ACTION, HOVERCRAFT, MOTION, OUTPUTS, STATES, WATCHED
+from ..fmu.interface import ACTION, ERRORS, HOVERCRAFT, MOTION, OUTPUTS, STATES, WATCHED
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..model.integrators import INTEGRATORS
@@ -71,7 +71,7 @@ def pages() -> dict[str, bytes]:
         "measured": _measured(),
         "machine": (RESULTS / "machine.txt").read_text(encoding="utf-8").strip(),
         "study": (SHIPPED / "turning_circle.toml").read_text(encoding="utf-8"),
-        "observed": (*STATES, *MOTION, *ACTION, *WATCHED),
+        "observed": (*STATES, *MOTION, *ACTION, *WATCHED, *ERRORS),
     }
     return {name: page.encode() for name, page in rendered(HERE, values).items()}
 

@@ -11,6 +11,7 @@ from ..fmu.interface import (
     ACTION,
     COUNTER_STOPPED,
     CRAFT_PARAMETERS,
+    ERRORS,
     HELD,
     INPUT_HELD,
     INPUTS,
@@ -148,7 +149,7 @@ class _Batch:
     def _keep(self, point: int, controls: Controls) -> None:
         read = self._plan.keep.read
         values = (*self._states, self._stability, self._rotation)
-        seen: dict[str, Any] = dict(zip((*STATES, *WATCHED), values, strict=True))
+        seen: dict[str, Any] = dict(zip((*STATES, *WATCHED), values, strict=True)) | dict.fromkeys(ERRORS, 0.0)
         if {*MOTION, *ACTION} & set(read):
             seen |= self._observed(controls)
         for i, name in enumerate(read):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fmu.interface import ACTION, BY_NAME, MOTION, STATES, WATCHED
+from ..fmu.interface import ACTION, BY_NAME, ERRORS, MOTION, STATES, WATCHED
 from ..fmu.variable import UNITS
 
 Record: TypeAlias = NDArray[np.float64]
@@ -18,7 +18,7 @@ Values: TypeAlias = NDArray[np.float64]
 Samples: TypeAlias = Mapping[str, NDArray[Any]]
 """Swept parameter -> its values, one a run."""
 
-OBSERVED = (*STATES, *MOTION, *ACTION, *WATCHED)
+OBSERVED = (*STATES, *MOTION, *ACTION, *WATCHED, *ERRORS)
 """What is read from the FMU, or worked out of the bare model."""
 
 

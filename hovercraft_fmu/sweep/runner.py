@@ -17,6 +17,7 @@ from .._version import __version__
 from ..building import default_fmu
 from ..fmu.interface import HOVERCRAFT
 from ..host import read_description
+from ..model.error_estimate import ON
 from ..simulation.fmu_run import own_starts
 from .engines import SETTINGS, Plan
 from .store import Store
@@ -138,6 +139,8 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
             raise ValueError(
                 f"fmu = {str(fmu)!r}: must not be given with the engine batch, which is the compiled kernel"
             )
+        if study.run.value("error_estimate") == ON or any(each.name == "error_estimate" for each in study.factors):
+            raise ValueError("error_estimate: must be off with the engine batch, which tells no error; take engine fmu")
     else:
         content, own = _content(study, Path(fmu or default_fmu()))
         study = replace(study, run=study.run.on(own))
