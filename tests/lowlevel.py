@@ -5,6 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from fmpy.fmi1 import FMICallException
+
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, VARIABLES
 from hovercraft_fmu.host import Fmu, Instance
 
@@ -38,10 +40,41 @@ def count(instance: Any, name: str = "substeps") -> int:
     return int(instance.getInteger([reference(name)])[0])
 
 
-def everything(instance: Any) -> dict[str, float]:
-    """All that can be read, by name."""
-    values = [*instance.getReal([v.reference for v in REALS]), *instance.getInteger([v.reference for v in INTEGERS])]
+def everything(instance: Any) -> dict[str, Any]:
+    """All that can be read, by name. Where nothing can, in FMI 2.0 before initialization, the whole state, as bytes."""
+    try:
+        values = list(instance.getReal([v.reference for v in REALS]))
+    except FMICallException:
+        assert "in state 'instantiated': must be called in state" in instance.host.messages.pop()
+        return {"": bytes(instance.serializeFMUstate(instance.getFMUstate()))}
+    values += instance.getInteger([v.reference for v in INTEGERS])
     return {variable.name: value for variable, value in zip((*REALS, *INTEGERS), values, strict=True)}
+
+
+DISCARD, ERROR, FATAL = 2, 3, 4
+DISCARDED_BY_FMI_2 = {
+    "fmi2SetReal": "both", "fmi2SetInteger": "both", "fmi2DoStep": "both", "fmi2SetContinuousStates": "exchange",
+    "fmi2GetReal": "exchange", "fmi2GetDerivatives": "exchange", "fmi2GetContinuousStates": "exchange",
+}  # fmt: skip
+"""Which functions can be, and of an instance for what (2.1.3)."""
+OF_THE_CALL = ("communicationStepSize = ", "currentCommunicationPoint = ", "startTime = ", "time = ", "fmi")
+"""How messages begin that are of arguments, times and phases, not of values that could be others."""
+OF_VALUES = (
+    "must be a finite number", "must be greater than 0", "must not be negative", "must be from ", "must be one of ",
+    "must be 0 ", "must be the same where both are set", "must not be above", "must not need more than",
+    "must not fall below", "must stay a finite number", "must lead to finite inputs", "must slide", "must be off",
+)  # fmt: skip
+
+
+def status_of_refusal(instance: Any, refused: FMICallException, message: str, exchange: bool = False) -> int:
+    """What the standards have for it: a call can be discarded where other values, another step or state would do."""
+    if instance.host.description.coSimulation.modelIdentifier == "Hovercraft":
+        return FATAL  # all that pythonfmu's wrapper has
+    avoidable = any(rule in message for rule in OF_VALUES) and not message.startswith(OF_THE_CALL)
+    if not isinstance(instance, Instance3):
+        use = DISCARDED_BY_FMI_2.get(refused.function, "")
+        avoidable = avoidable and (use == "both" or (use == "exchange" and exchange))
+    return DISCARD if avoidable else ERROR
 
 
 FMI_3_NAMES = {

@@ -51,6 +51,7 @@ def test_start_values_by_name_and_type(craft: Instance) -> None:
 
 def test_a_group_of_several_types_is_set_together(craft: Instance) -> None:
     group = craft.port("integrator", "mass", "drag_area", "step_size")
+    craft.enter_initialization()
     group.set([2, 50.0, 2, 0.01])
     assert group.get() == [2, 50.0, 2, 0.01]
 

@@ -18,7 +18,7 @@ from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour, mod
 from hovercraft_fmu.fmu.extras import RESULT, terminals
 from hovercraft_fmu.fmu.interface import BY_NAME, HOVERCRAFT, INPUTS, STATES
 from hovercraft_fmu.studies.pages import default_result
-from tests.lowlevel import one
+from tests.lowlevel import DISCARD, ERROR, everything, one, put, start
 
 FLAVOURS = [PYTHON, NATIVE, NATIVE3, AUTOPILOT]
 
@@ -148,6 +148,77 @@ def test_the_categories_that_are_logged_are_declared(fmu: Path, tmp_path: Path) 
     assert names <= {
         node.get("name") for node in etree.fromstring(xml(model_description("0", PYTHON))).iter("Category")
     }
+
+
+# ---- what becomes of a refused call
+
+
+RUNS_AWAY = {"velocity__yaw_rate": 1e200}
+
+
+def test_a_discarded_step_can_be_tried_otherwise(each_native_fmu: Path, standard: int) -> None:
+    """[2.0: 2.1.3, 4.2.2; 3.0: 2.2.4] It is discarded, not an error: the instance is where it was, and goes on."""
+    with one(each_native_fmu) as (instance, messages):
+        start(instance)
+        instance.doStep(0.0, 0.5)
+        before = everything(instance)
+        with pytest.raises(FMICallException) as caught:
+            instance.doStep(0.5, 1e9)  # of 1e12 sub-steps
+        assert caught.value.status == DISCARD
+        assert everything(instance) == before
+        if standard == 2:
+            assert instance.getRealStatus(fmi2.fmi2LastSuccessfulTime) == 0.5
+            assert not instance.getBooleanStatus(fmi2.fmi2Terminated)
+        instance.doStep(0.5, 0.5)
+        assert len(messages) == 1
+        instance.terminate()
+
+
+def test_a_discarded_step_that_is_tried_again_as_it_was_is_an_error(each_native_fmu: Path) -> None:
+    """It would be discarded for ever, and fmpy's master tries for ever: so it stops, with the message."""
+    with one(each_native_fmu) as (instance, messages):
+        start(instance, **RUNS_AWAY)
+        for status in (DISCARD, ERROR):
+            instance.setReal([BY_NAME["thrust"].reference], [5.0])
+            with pytest.raises(FMICallException) as caught:
+                instance.doStep(0.0, 0.1)
+            assert caught.value.status == status
+        assert messages[-1].startswith("communication step of 0.1 s from 0.0 s: was discarded; it must be tried with")
+        put(instance, thrust=6.0)
+        with pytest.raises(FMICallException) as caught:
+            instance.doStep(0.0, 0.1)
+        assert caught.value.status == DISCARD
+    with pytest.raises(FMICallException):
+        fmpy.simulate_fmu(str(each_native_fmu), start_values={"velocity.yaw_rate": 1e200}, stop_time=1.0)
+
+
+def test_nothing_is_read_before_initialization(each_fmu: Path) -> None:
+    """[2.0: 3.2.3, 4.2.4] 'instantiated' has no getters; the Python FMU's wrapper makes a fatal error of it."""
+    with one(each_fmu) as (instance, messages):
+        if instance.host.is_fmi_3:
+            assert instance.getFloat64([BY_NAME["mass"].reference]) == [100.0]
+            return
+        for name, get in (("Real", instance.getReal), ("Integer", instance.getInteger)):
+            with pytest.raises(FMICallException):
+                get([BY_NAME["mass" if name == "Real" else "substeps"].reference])
+            assert messages[-1].startswith(f"fmi2Get{name} in state 'instantiated': must be called in state 'init")
+        start(instance)
+        assert instance.getReal([BY_NAME["mass"].reference]) == [100.0]
+
+
+def test_an_instance_with_an_error_is_not_terminated(each_native_fmu: Path) -> None:
+    """[2.0: 4.2.4, the column 'error'; 3.0: 2.3.1] It is reset or freed, or given a state."""
+    with one(each_native_fmu) as (instance, messages):
+        start(instance)
+        state = instance.getFMUstate()
+        with pytest.raises(FMICallException):
+            instance.doStep(9.0, 0.1)
+        with pytest.raises(FMICallException):
+            instance.terminate()
+        assert "Terminate after an error: the instance must be reset or freed, or given a state" in messages[-1]
+        instance.setFMUstate(state)
+        instance.terminate()
+        instance.freeFMUstate(state)
 
 
 # ---- terminals and icon

@@ -371,6 +371,8 @@ def initially_read(instance: Any, values: dict[str, float], drag_area: int) -> l
     instance.reset()
     instance.setInteger([reference("drag_area")], [drag_area])
     instance.setReal([reference(name) for name in values], list(values.values()))
+    instance.setupExperiment()
+    instance.enterInitializationMode()
     return get(instance, *INITIAL_UNKNOWNS)
 
 

@@ -67,6 +67,7 @@ PARTS = (
 """Whatever the standard."""
 LOG_CATEGORIES = {
     "logStatusWarning": "What the run survives but its user should know",
+    "logStatusDiscard": "A call that was refused, where other values, another step or another state can be tried",
     "logStatusError": "A call that was refused",
     "logAll": "Everything",
 }

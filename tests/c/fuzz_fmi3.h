@@ -1,5 +1,25 @@
 /* Of fuzz.c: what FMI 3.0 has of its own. */
 
+/* Inside a step: mostly an input, as it can be or not; now and then what must not be called there. */
+static void update(fmi3InstanceEnvironment environment, double time, bool set, bool get, bool finished, bool early,
+                   bool *return_early, double *when)
+{
+    void *craft = stepping.craft, *state = NULL;
+    const unsigned how = a_byte(stepping.bytes), input = INPUTS[how % INPUT_COUNT];
+    (void)environment, (void)return_early, (void)when;
+    demand(isfinite(time) && set && !get && !finished && !early, "the flags inside a step");
+    if (how < 64)
+        return;
+    if (how < 250) {
+        const double value = a_double(stepping.bytes);
+        demand(call_set(craft, &input, 1, &value) == (isfinite(value) ? CALL_OK : CALL_REFUSED), "an input in a step");
+        return;
+    }
+    demand(call_step(craft, time, 0.1) == CALL_REFUSED && call_terminate(craft) == CALL_REFUSED &&
+               call_reset(craft) == CALL_REFUSED && call_save(craft, &state) == CALL_REFUSED,
+           "a call that must not be made inside a step");
+}
+
 static void *made(struct bytes *bytes)
 {
     static const unsigned reference = V_THRUST;
@@ -19,7 +39,7 @@ static void *made(struct bytes *bytes)
     if (how == 15)
         return fmi3InstantiateScheduledExecution(name, token, NULL, false, logging, NULL, log, NULL, NULL, NULL);
     return fmi3InstantiateCoSimulation(name, token, NULL, false, logging, how == 23, how & 8, &reference, how == 27,
-                                       NULL, log, NULL);
+                                       NULL, log, how & 16 ? update : NULL);
 }
 
 static int integer_of(void *craft, unsigned reference)

@@ -71,7 +71,7 @@ enum verdict instance_set_states(struct instance *instance, const double *values
         return REFUSED;
     for (unsigned i = 0; i < STATE_COUNT; i++)
         if (!isfinite(values[i]))
-            return instance_say(instance, REFUSED, "%s = %r: must be a finite number", VARIABLES[STATES[i]].name,
+            return instance_say(instance, DISCARDED, "%s = %r: must be a finite number", VARIABLES[STATES[i]].name,
                                 values[i]);
     memcpy(&now->state, values, sizeof now->state);
     now->motion_unread = now->action_unread = true;

@@ -22,7 +22,9 @@ struct component {
 
 static fmi2Status status_of(enum verdict verdict)
 {
-    return verdict == FINE ? fmi2OK : verdict == WARNED ? fmi2Warning : fmi2Error;
+    static const fmi2Status statuses[] = {
+        [FINE] = fmi2OK, [WARNED] = fmi2Warning, [DISCARDED] = fmi2Discard, [REFUSED] = fmi2Error};
+    return statuses[verdict];
 }
 
 /* What comes of a call: it is made in a floating-point environment of its own, and where it is permitted. */

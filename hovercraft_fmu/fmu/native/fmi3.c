@@ -23,7 +23,9 @@ struct component {
 
 static fmi3Status status_of(enum verdict verdict)
 {
-    return verdict == FINE ? fmi3OK : verdict == WARNED ? fmi3Warning : fmi3Error;
+    static const fmi3Status statuses[] = {
+        [FINE] = fmi3OK, [WARNED] = fmi3Warning, [DISCARDED] = fmi3Discard, [REFUSED] = fmi3Error};
+    return statuses[verdict];
 }
 
 /* What comes of a call: it is made in a floating-point environment of its own, and where it is permitted. */

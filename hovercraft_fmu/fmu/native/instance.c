@@ -21,6 +21,8 @@ enum verdict instance_reset(struct instance *instance)
     };
     instance->now = empty;
     instance->last_step = FINE;
+    instance->failed = false;
+    instance->discarded = 0;
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
         if (!VARIABLES[i].start_given)
             continue;
@@ -36,8 +38,10 @@ enum verdict instance_start(struct instance *instance, enum use use, const struc
 {
     instance->now = (struct content){.use = use, .phase = INSTANTIATED};
     instance->services = *services;
-    instance->warnings = logging;
-    instance->errors = true;
+    instance->logged = logging ? ~0u : 1u << DISCARDED | 1u << REFUSED;
+    instance->call = NO_CALL;
+    instance->refusal = REFUSED;
+    instance->errors = 0;
     instance->inside = false;
     return variant_check(instance) == REFUSED ? REFUSED : instance_reset(instance);
 }
@@ -90,7 +94,7 @@ static enum verdict check_derived(struct instance *instance, const struct craft 
         const struct derived_value *value = &DERIVED[i];
         const double found = *(const double *)(const void *)((const char *)&derived + value->offset);
         if (!isfinite(found))
-            return instance_say(instance, REFUSED, "%s = %r %s: must be a finite number; it is made of %s", value->name,
+            return instance_say(instance, DISCARDED, "%s = %r %s: must be a finite number; it is made of %s", value->name,
                                 found, value->unit, value->parts);
     }
     return FINE;
@@ -106,7 +110,7 @@ static enum verdict choose(struct instance *instance, unsigned enumeration, int3
     const unsigned beside = CHOICES[i].number;
     const int32_t said = integers[enumeration], number = integers[beside];
     if (number != 0 && number != said && said != (int32_t)variant()->starts[enumeration])
-        return instance_say(instance, REFUSED, "%s = %i and %s = %i: must be the same where both are set",
+        return instance_say(instance, DISCARDED, "%s = %i and %s = %i: must be the same where both are set",
                             VARIABLES[enumeration].name, (long long)said, VARIABLES[beside].name, (long long)number);
     *item = number != 0 ? number : said;
     return FINE;
@@ -124,7 +128,7 @@ enum verdict instance_make_craft(struct instance *instance, struct craft *craft)
             return REFUSED;
     }
     if (craft->thrust_max - craft->thrust_min < 0.0)
-        return instance_say(instance, REFUSED, "thrust_min = %r N: must not be above thrust_max = %r N",
+        return instance_say(instance, DISCARDED, "thrust_min = %r N: must not be above thrust_max = %r N",
                             craft->thrust_min, craft->thrust_max);
     return check_derived(instance, craft);
 }
@@ -193,6 +197,7 @@ enum verdict instance_restore(struct instance *instance, const struct content *c
                             exchange ? "co-simulation" : "model exchange");
     instance->now = *content;
     instance->last_step = FINE;
+    instance->failed = false;
     return FINE;
 }
 

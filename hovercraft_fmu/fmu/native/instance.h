@@ -22,7 +22,10 @@
 #define DOOR HIDDEN
 #endif
 
-enum verdict { FINE, WARNED, REFUSED };
+/* A refused call changes nothing. It is DISCARDED where the standard has that for the call and other values, another
+   step or another state could be taken; else REFUSED, an error. So it is said, and a face hears of it when it leaves
+   (instance_leave); within the instance both are REFUSED. */
+enum verdict { FINE, WARNED, DISCARDED, REFUSED };
 
 /* What the host takes it for: steps, or equations for a solver of its own. */
 enum use { CO_SIMULATION, MODEL_EXCHANGE };
@@ -67,9 +70,13 @@ struct content {
 struct instance {
     struct content now;
     struct services services;
-    bool warnings, errors; /* the categories that are logged */
+    unsigned logged;        /* bit n: verdict n, each a category */
+    enum call call;         /* that is made, or was last */
+    enum verdict refusal;   /* of it: as what it was said */
+    unsigned errors;        /* that were said */
+    bool failed;            /* one of them since the start or the last state that was set */
     enum verdict last_step;
-    unsigned refusals; /* that were said */
+    uint64_t discarded;     /* what the step before was made of, if it was discarded; else 0 */
     struct environment host; /* its floating-point environment, while a call is inside */
     bool inside;
 };
@@ -86,7 +93,7 @@ static inline enum verdict instance_leave(struct instance *instance, enum verdic
     if (instance->inside)
         environment_leave(&instance->host);
     instance->inside = false;
-    return verdict;
+    return verdict == REFUSED ? instance->refusal : verdict;
 }
 
 /* Around what a call asks of the host. */
@@ -111,7 +118,7 @@ DOOR enum verdict instance_reset(struct instance *instance);
 
 /* What permits.c lets through (permits.h) is in the right phase and of the right use; no array is NULL. */
 
-/* Say something, and return the verdict. For `format` see text.h. */
+/* Say something, and return the verdict: REFUSED for DISCARDED, too. For `format` see text.h. */
 DOOR enum verdict instance_say(struct instance *instance, enum verdict verdict, const char *format, ...);
 /* Switched on, these categories are told, in FMI 2.0 only these, in FMI 3.0 these too; switched off, these no more.
    Without categories it is all of them. */
@@ -213,6 +220,8 @@ DOOR enum verdict instance_adjoint_derivatives(struct instance *instance, const 
 
 /* ---- serialize.c: the same bytes on every platform. */
 DOOR enum verdict instance_serialized_size(const struct content *content, size_t *size);
+/* Of all that the next step follows, and it. */
+DOOR uint64_t instance_checksum(const struct content *content, double point, double step);
 /* Refused: less than that. */
 DOOR enum verdict instance_serialize(struct instance *instance, const struct content *content, unsigned char *bytes,
                                      size_t size);

@@ -102,7 +102,7 @@ static enum verdict linearize(struct instance *instance, enum call call, const u
     if (to_come && now->tuned && instance_make_craft(instance, &craft) == REFUSED)
         return REFUSED;
     if (is_stuck(&now->state, &craft) && is_accelerated(unknowns, n_unknowns))
-        return instance_say(instance, REFUSED, "%s: the craft is at rest on ground that rubs: it must slide to have "
+        return instance_say(instance, DISCARDED, "%s: the craft is at rest on ground that rubs: it must slide to have "
                                                "partial derivatives", call_name(instance, call));
     bool parameters = now->phase == INITIALIZING;
     for (size_t k = 0; k < n_knowns; k++)
@@ -112,7 +112,7 @@ static enum verdict linearize(struct instance *instance, enum call call, const u
         for (size_t k = 0; k < n_knowns; k++) {
             const double value = partial(linearization, unknowns[i], knowns[k]);
             if (!isfinite(value))
-                return instance_say(instance, REFUSED,
+                return instance_say(instance, DISCARDED,
                                     "derivative of %s with respect to %s = %r: must be a finite number; the motion is "
                                     "out of range",
                                     VARIABLES[unknowns[i]].name, VARIABLES[knowns[k]].name, value);
@@ -140,7 +140,7 @@ enum verdict instance_directional_derivatives(struct instance *instance, const u
     for (size_t i = 0; i < n_unknowns; i++) {
         const double value = directional(&linearization, unknowns[i], knowns, n_knowns, seeds);
         if (!isfinite(value)) /* so are those with a seed that is none */
-            return instance_say(instance, REFUSED, "directional derivative of %s = %r: must be a finite number",
+            return instance_say(instance, DISCARDED, "directional derivative of %s = %r: must be a finite number",
                                 VARIABLES[unknowns[i]].name, value);
     }
     for (size_t i = 0; i < n_unknowns; i++)
@@ -167,7 +167,7 @@ enum verdict instance_adjoint_derivatives(struct instance *instance, const unsig
     for (size_t k = 0; k < n_knowns; k++) {
         const double value = adjoint(&linearization, unknowns, n_unknowns, knowns[k], seeds);
         if (!isfinite(value)) /* so are those with a seed that is none */
-            return instance_say(instance, REFUSED, "adjoint derivative of %s = %r: must be a finite number",
+            return instance_say(instance, DISCARDED, "adjoint derivative of %s = %r: must be a finite number",
                                 VARIABLES[knowns[k]].name, value);
     }
     for (size_t k = 0; k < n_knowns; k++)

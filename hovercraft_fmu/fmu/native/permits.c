@@ -5,11 +5,14 @@
 #define IN(phase) (1u << (phase))
 #define EVER (~IN(INTERMEDIATE_UPDATE)) /* inside a step almost nothing may be called */
 #define PAST(phase) (~0u << (phase) << 1 & EVER)
+#define EITHER_USE (IN(CO_SIMULATION) | IN(MODEL_EXCHANGE))
 #define SOLVED (IN(EVENT_MODE) | IN(CONTINUOUS_TIME)) /* the phases that are model exchange's alone */
 
 struct permit {
     const char *names[2]; /* in FMI 2.0, in FMI 3.0 */
     unsigned phases;      /* bit n: in phase n */
+    unsigned not_in_2;    /* of these, those that FMI 2.0 has not */
+    unsigned discarded;   /* in FMI 2.0 (2.1.3) it can be, of an instance for this use; in FMI 3.0 (2.2.4) any can */
     unsigned named;       /* those that a refusal names; 0: all */
     enum { FOR_BOTH, FOR_STEPS, FOR_EXCHANGE } only; /* instances for this use have the call */
 };
@@ -24,11 +27,13 @@ static const struct permit PERMITS[CALL_COUNT] = {
     [TERMINATE] = {.names = {"fmi2Terminate", "fmi3Terminate"}, .phases = IN(STEPPING) | SOLVED},
     [RESET] = {.names = {"fmi2Reset", "fmi3Reset"}, .phases = EVER},
 
-    [GET_REALS] = {.names = {"fmi2GetReal", "fmi3GetFloat64"}, .phases = EVER},
+    [GET_REALS] = {.names = {"fmi2GetReal", "fmi3GetFloat64"}, .phases = EVER, .not_in_2 = IN(INSTANTIATED),
+                   .discarded = IN(MODEL_EXCHANGE)},
     [SET_REALS] = {.names = {"fmi2SetReal", "fmi3SetFloat64"},
-                   .phases = EVER | IN(INTERMEDIATE_UPDATE)}, /* each variable has phases of its own */
-    [GET_INTEGERS] = {.names = {"fmi2GetInteger", "fmi3GetInt32"}, .phases = EVER},
-    [SET_INTEGERS] = {.names = {"fmi2SetInteger", "fmi3SetInt32"}, .phases = EVER},
+                   .phases = EVER | IN(INTERMEDIATE_UPDATE), /* each variable has phases of its own */
+                   .discarded = EITHER_USE},
+    [GET_INTEGERS] = {.names = {"fmi2GetInteger", "fmi3GetInt32"}, .phases = EVER, .not_in_2 = IN(INSTANTIATED)},
+    [SET_INTEGERS] = {.names = {"fmi2SetInteger", "fmi3SetInt32"}, .phases = EVER, .discarded = EITHER_USE},
     [GET_ENUMERATIONS] = {.names = {"fmi2GetInteger", "fmi3GetInt64"}, .phases = EVER},
     [SET_ENUMERATIONS] = {.names = {"fmi2SetInteger", "fmi3SetInt64"}, .phases = EVER},
 
@@ -47,8 +52,8 @@ static const struct permit PERMITS[CALL_COUNT] = {
     [SET_INPUT_RATES] = {.names = {"fmi2SetRealInputDerivatives", ""},
                          .phases = EVER, .only = FOR_STEPS},
     [GET_OUTPUT_RATES] = {.names = {"fmi2GetRealOutputDerivatives", "fmi3GetOutputDerivatives"},
-                          .phases = EVER, .only = FOR_STEPS},
-    [STEP] = {.names = {"fmi2DoStep", "fmi3DoStep"}, .phases = IN(STEPPING)},
+                          .phases = EVER, .not_in_2 = IN(INSTANTIATED) | IN(INITIALIZING), .only = FOR_STEPS},
+    [STEP] = {.names = {"fmi2DoStep", "fmi3DoStep"}, .phases = IN(STEPPING), .discarded = IN(CO_SIMULATION)},
     [CANCEL_STEP] = {.names = {"fmi2CancelStep", ""}, .phases = EVER},
     [GET_STATUS] = {.names = {"fmi2GetStatus", ""}, .phases = EVER},
     [GET_REAL_STATUS] = {.names = {"fmi2GetRealStatus", ""}, .phases = EVER},
@@ -64,10 +69,12 @@ static const struct permit PERMITS[CALL_COUNT] = {
     [COMPLETE_INTEGRATOR_STEP] = {.names = {"fmi2CompletedIntegratorStep", "fmi3CompletedIntegratorStep"},
                                   .phases = IN(CONTINUOUS_TIME)},
     [SET_TIME] = {.names = {"fmi2SetTime", "fmi3SetTime"}, .phases = SOLVED},
-    [SET_STATES] = {.names = {"fmi2SetContinuousStates", "fmi3SetContinuousStates"}, .phases = IN(CONTINUOUS_TIME)},
-    [GET_STATES] = {.names = {"fmi2GetContinuousStates", "fmi3GetContinuousStates"},
+    [SET_STATES] = {.names = {"fmi2SetContinuousStates", "fmi3SetContinuousStates"}, .phases = IN(CONTINUOUS_TIME),
+                    .discarded = IN(MODEL_EXCHANGE)},
+    [GET_STATES] = {.names = {"fmi2GetContinuousStates", "fmi3GetContinuousStates"}, .discarded = IN(MODEL_EXCHANGE),
                     .phases = PAST(INSTANTIATED), .named = IN(INITIALIZING), .only = FOR_EXCHANGE},
     [GET_DERIVATIVES] = {.names = {"fmi2GetDerivatives", "fmi3GetContinuousStateDerivatives"},
+                         .discarded = IN(MODEL_EXCHANGE),
                          .phases = PAST(INSTANTIATED), .named = IN(INITIALIZING), .only = FOR_EXCHANGE},
     [GET_NOMINALS] = {.names = {"fmi2GetNominalsOfContinuousStates", "fmi3GetNominalsOfContinuousStates"},
                       .phases = EVER, .only = FOR_EXCHANGE},
@@ -91,11 +98,23 @@ bool permitted_always(struct instance *instance, const char *name, bool given)
     return instance && given;
 }
 
-/* Those that a refusal names: as many as an instance of its use can be in, if any. */
-static unsigned named_phases(const struct permit *permit, enum use use)
+bool can_be_discarded(const struct instance *instance)
 {
-    const unsigned phases = permit->named ? permit->named : permit->phases;
-    const unsigned possible = phases & (use == MODEL_EXCHANGE ? ~IN(STEPPING) : ~SOLVED);
+    if (instance->call == NO_CALL || instance->now.phase == INTERMEDIATE_UPDATE)
+        return false;
+    return instance->services.fmi == 3 || PERMITS[instance->call].discarded & IN(instance->now.use);
+}
+
+static unsigned phases_of(const struct permit *permit, const struct instance *instance)
+{
+    return instance->services.fmi == 3 ? permit->phases : permit->phases & ~permit->not_in_2;
+}
+
+/* Those that a refusal names: as many as an instance of its use can be in, if any. */
+static unsigned named_phases(const struct permit *permit, const struct instance *instance)
+{
+    const unsigned phases = permit->named ? permit->named : phases_of(permit, instance);
+    const unsigned possible = phases & (instance->now.use == MODEL_EXCHANGE ? ~IN(STEPPING) : ~SOLVED);
     return possible ? possible : phases;
 }
 
@@ -116,13 +135,18 @@ static void refuse_phase(struct instance *instance, const char *name, unsigned p
 bool permitted(struct instance *instance, enum call call, bool given)
 {
     const struct permit *permit = &PERMITS[call];
+    if (instance)
+        instance->call = call;
     if (!instance || !permitted_always(instance, call_name(instance, call), given))
         return false;
     if (permit->only && permit->only != (instance->now.use == MODEL_EXCHANGE ? FOR_EXCHANGE : FOR_STEPS))
         instance_say(instance, REFUSED, "%s: must be called of an instance for %s", call_name(instance, call),
                      permit->only == FOR_EXCHANGE ? "model exchange" : "co-simulation");
-    else if (!(permit->phases & IN(instance->now.phase)))
-        refuse_phase(instance, call_name(instance, call), named_phases(permit, instance->now.use));
+    else if (!(phases_of(permit, instance) & IN(instance->now.phase)))
+        refuse_phase(instance, call_name(instance, call), named_phases(permit, instance));
+    else if (call == TERMINATE && instance->failed)
+        instance_say(instance, REFUSED, "%s after an error: the instance must be reset or freed, or given a state",
+                     call_name(instance, call));
     else
         return true;
     return false;

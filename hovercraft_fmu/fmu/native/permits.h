@@ -51,7 +51,8 @@ enum call {
     GET_EVENT_INDICATORS,
     COUNT_STATES,
     COUNT_EVENT_INDICATORS,
-    CALL_COUNT
+    CALL_COUNT,
+    NO_CALL = CALL_COUNT
 };
 
 /* Whether a call may be made now; said, where not. `given`: no argument is NULL that must not be. Without an instance
@@ -59,6 +60,8 @@ enum call {
 HIDDEN bool permitted(struct instance *instance, enum call call, bool given);
 /* Of a call that is not in the table: it may be made in every state. */
 HIDDEN bool permitted_always(struct instance *instance, const char *name, bool given);
+/* Whether the call that is made can be discarded, by the standard of the instance. */
+HIDDEN bool can_be_discarded(const struct instance *instance);
 /* As the standard of the instance has it. */
 HIDDEN const char *call_name(const struct instance *instance, enum call call);
 

@@ -25,7 +25,7 @@ enum verdict instance_set_rates(struct instance *instance, const unsigned *refer
             check_order(instance, references[i], orders[i], values[i]) == REFUSED)
             return REFUSED;
         if (!isfinite(values[i]))
-            return instance_say(instance, REFUSED, "derivative of %s = %r: must be a finite number", variable->name,
+            return instance_say(instance, DISCARDED, "derivative of %s = %r: must be a finite number", variable->name,
                                 values[i]);
     }
     for (size_t i = 0; i < n; i++) {
@@ -101,7 +101,7 @@ enum verdict instance_get_rates(struct instance *instance, const unsigned *refer
         if (check_order(instance, references[i], orders[i], 0.0) == REFUSED)
             return REFUSED;
         if (!isfinite(rate))
-            return instance_say(instance, REFUSED,
+            return instance_say(instance, DISCARDED,
                                 "derivative of %s = %r: must be a finite number; the motion is out of range",
                                 VARIABLES[references[i]].name, rate);
     }

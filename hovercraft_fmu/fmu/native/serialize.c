@@ -15,13 +15,14 @@
 enum { VERSION = 6, MAGIC_SIZE = 8, BUILD_SIZE = 32, HEAD_SIZE = MAGIC_SIZE + 4 + BUILD_SIZE, SUM_SIZE = 8 };
 static const char MAGIC[] = "HOVERFMU";
 
-enum direction { MEASURE, WRITE, READ };
+enum direction { MEASURE, WRITE, READ, SUM };
 
 struct cursor {
     enum direction direction;
     unsigned char *to;         /* where to write */
     const unsigned char *from; /* where to read */
     size_t at;
+    uint64_t sum; /* of what there is */
 };
 
 static void exchange_word(struct cursor *cursor, uint64_t *word, unsigned size)
@@ -35,6 +36,8 @@ static void exchange_word(struct cursor *cursor, uint64_t *word, unsigned size)
     }
     if (cursor->direction == READ)
         *word = read;
+    if (cursor->direction == SUM)
+        cursor->sum = checksum(cursor->sum, word, size);
     cursor->at += size;
 }
 
@@ -129,16 +132,26 @@ static void exchange(struct cursor *cursor, struct content *c)
 static size_t serialized_size(bool estimates)
 {
     struct content content = {.phase = INSTANTIATED, .estimates = estimates};
-    struct cursor cursor = {MEASURE, NULL, NULL, HEAD_SIZE};
+    struct cursor cursor = {.direction = MEASURE, .at = HEAD_SIZE};
     exchange(&cursor, &content);
     return cursor.at + SUM_SIZE;
+}
+
+uint64_t instance_checksum(const struct content *content, double point, double step)
+{
+    struct content copy = *content;
+    struct cursor cursor = {.direction = SUM, .sum = CHECKSUM_OF_NOTHING};
+    exchange(&cursor, &copy);
+    exchange_double(&cursor, &point);
+    exchange_double(&cursor, &step);
+    return cursor.sum;
 }
 
 enum verdict instance_serialize(struct instance *instance, const struct content *content, unsigned char *bytes,
                                 size_t size)
 {
     struct content copy = *content;
-    struct cursor cursor = {WRITE, bytes, NULL, MAGIC_SIZE};
+    struct cursor cursor = {.direction = WRITE, .to = bytes, .at = MAGIC_SIZE};
     int32_t version = VERSION;
     const size_t needed = serialized_size(content->estimates);
     if (size < needed)
@@ -157,7 +170,7 @@ enum verdict instance_serialize(struct instance *instance, const struct content 
 
 static bool is_complete(const unsigned char *bytes, size_t size)
 {
-    struct cursor cursor = {READ, NULL, bytes, size - SUM_SIZE};
+    struct cursor cursor = {.direction = READ, .from = bytes, .at = size - SUM_SIZE};
     uint64_t sum;
     if (size < HEAD_SIZE + SUM_SIZE || memcmp(bytes, MAGIC, MAGIC_SIZE) != 0)
         return false;
@@ -167,7 +180,7 @@ static bool is_complete(const unsigned char *bytes, size_t size)
 
 static bool is_of_this_build(const unsigned char *bytes, size_t size)
 {
-    struct cursor cursor = {READ, NULL, bytes, MAGIC_SIZE};
+    struct cursor cursor = {.direction = READ, .from = bytes, .at = MAGIC_SIZE};
     int32_t version = 0;
     exchange_integer(&cursor, &version);
     return version == VERSION && (size == serialized_size(false) || size == serialized_size(true)) &&
@@ -199,7 +212,7 @@ static bool is_possible(const struct content *c)
 static enum verdict deserialize(struct instance *instance, const unsigned char *bytes, size_t size,
                                 struct content *content)
 {
-    struct cursor cursor = {READ, NULL, bytes, HEAD_SIZE};
+    struct cursor cursor = {.direction = READ, .from = bytes, .at = HEAD_SIZE};
     char build[BUILD_SIZE + 1] = "";
     if (!is_complete(bytes, size))
         return instance_say(instance, REFUSED, "serialized FMU state of %u bytes: must be complete and unchanged",

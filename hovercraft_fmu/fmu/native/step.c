@@ -49,7 +49,7 @@ static enum verdict refuse_motion(struct instance *instance, const struct stretc
     memcpy(parts, &stretch->state, sizeof parts);
     while (n + 1 < STATE_COUNT && isfinite(parts[i]))
         i = (++n + STATE_COUNT / 2) % STATE_COUNT;
-    return instance_say(instance, REFUSED,
+    return instance_say(instance, DISCARDED,
                         "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
                         "stands; the motion is too fast for sub-steps of %r s: set a smaller step_size",
                         VARIABLES[STATES[i]].name, parts[i], instance->now.time, instance->now.time,
@@ -61,11 +61,11 @@ static enum verdict refuse_step(struct instance *instance, enum outcome outcome,
 {
     const struct settings *settings = &instance->now.settings;
     if (outcome == TOO_MANY_SUBSTEPS)
-        return instance_say(instance, REFUSED,
+        return instance_say(instance, DISCARDED,
                             "communication step = %r s: must not need more than 10^9 sub-steps of step_size = %r s",
                             step, settings->step_size);
     if (outcome == STEP_TOO_SMALL)
-        return instance_say(instance, REFUSED,
+        return instance_say(instance, DISCARDED,
                             "step = %r s: must not fall below 1e-12 s to meet tolerance = %r; set a larger tolerance",
                             stretch->substep, settings->tolerance);
     return refuse_motion(instance, stretch);
@@ -78,7 +78,7 @@ static enum verdict check_watched(struct instance *instance, double stability, d
     const double time = instance->now.time;
     if (isfinite(stability) && !turns)
         return FINE;
-    return instance_say(instance, REFUSED,
+    return instance_say(instance, DISCARDED,
                         "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
                         "stands; the motion is too fast for sub-steps of %r s: set a smaller step_size",
                         VARIABLES[turns ? V_ROTATION_PER_SUBSTEP : V_STABILITY_NUMBER].name,
@@ -239,10 +239,12 @@ static struct controls inputs_at(void *asked, double time)
     const bool is_within = time < inquiry->step && inquiry->point + time < inquiry->end;
     const volatile double at = is_within ? inquiry->point + time : inquiry->end; /* not in the host's environment */
     now->phase = INTERMEDIATE_UPDATE;
+    const enum call call = instance->call;
     const bool inside = instance_go_out(instance);
     services->ask(services->sink, at);
     instance_come_back(instance, inside);
     now->phase = STEPPING;
+    instance->call = call;
     if (held_input(&now->inputs, inquiry->craft).input < INPUT_COUNT)
         inquiry->start = now->inputs;
     return now->inputs;
@@ -265,7 +267,7 @@ static enum verdict make_drive(struct inquiry *inquiry, struct drive *drive, str
         finite = finite && isfinite(ends[i]);
     if (finite)
         return FINE;
-    return instance_say(instance, REFUSED, "input derivatives over %r s: must lead to finite inputs", step);
+    return instance_say(instance, DISCARDED, "input derivatives over %r s: must lead to finite inputs", step);
 }
 
 static enum verdict take_step(struct instance *instance, double point, double step)
@@ -278,7 +280,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     struct companion companion;
     const double end_time = point + step;
     struct inquiry inquiry = {instance, &craft, point, end_time, step, -INFINITY, now->inputs};
-    const unsigned refusals = instance->refusals;
+    const unsigned errors = instance->errors;
     if (check_step(instance, point, step) == REFUSED)
         return REFUSED;
     inquiry.step = step = kernel_meant_step(point, step, now->start_time, now->settings.step_size);
@@ -303,7 +305,7 @@ static enum verdict take_step(struct instance *instance, double point, double st
     }
     if (instance->services.ask)
         end = inputs_at(&inquiry, step);
-    if (instance->refusals != refusals)
+    if (instance->errors != errors)
         return instance_say(instance, REFUSED,
                             "step from %r s: a call inside it was refused; the state of %r s stands", point, now->time);
     if (check_watched(instance, stretch.stability, stretch.rotation) == REFUSED)
@@ -329,13 +331,29 @@ static enum verdict take_step(struct instance *instance, double point, double st
     return worse(verdict, instance_warn_of_held_inputs(instance, &end));
 }
 
+/* Tried again as it was a step would be discarded for ever, and there are masters that never stop trying. Where the
+   host is asked for inputs, they may be other ones. */
+static enum verdict check_again(struct instance *instance, double point, double step)
+{
+    if (instance->services.ask || instance_checksum(&instance->now, point, step) != instance->discarded)
+        return FINE;
+    return instance_say(instance, REFUSED,
+                        "communication step of %r s from %r s: was discarded; it must be tried with a shorter step, other "
+                        "inputs or parameters, or another state",
+                        step, point);
+}
+
 enum verdict instance_step(struct instance *instance, double point, double step)
 {
     const struct controls inputs = instance->now.inputs;
-    const enum verdict verdict = take_step(instance, point, step);
+    enum verdict verdict = REFUSED;
+    if (!instance->discarded || check_again(instance, point, step) != REFUSED)
+        verdict = take_step(instance, point, step);
     if (verdict == REFUSED && instance->services.ask) { /* what was set inside it, too */
         instance->now.inputs = inputs;
         instance_spread(instance->now.reals, &inputs, INPUTS, INPUT_COUNT);
     }
-    return instance->last_step = verdict;
+    instance->last_step = verdict == REFUSED ? instance->refusal : verdict;
+    instance->discarded = instance->last_step == DISCARDED ? instance_checksum(&instance->now, point, step) : 0;
+    return verdict;
 }

@@ -9,7 +9,7 @@ static enum verdict check_finite(struct instance *instance, const unsigned *refe
 {
     for (unsigned i = 0; i < n; i++)
         if (!isfinite(instance->now.reals[references[i]]))
-            return instance_say(instance, REFUSED, "%s = %r: must be a finite number; the motion is out of range",
+            return instance_say(instance, DISCARDED, "%s = %r: must be a finite number; the motion is out of range",
                                 VARIABLES[references[i]].name, instance->now.reals[references[i]]);
     return FINE;
 }
@@ -174,15 +174,15 @@ static enum verdict check_real(struct instance *instance, const struct variable 
     if (instance_check_settable(instance, variable, value) == REFUSED)
         return REFUSED;
     if (!isfinite(value))
-        return instance_say(instance, REFUSED, "%s = %r: must be a finite number", variable->name, value);
+        return instance_say(instance, DISCARDED, "%s = %r: must be a finite number", variable->name, value);
     if (variable == &VARIABLES[V_SKIRT_FRICTION] && value > 0.0 && instance->now.use == MODEL_EXCHANGE)
-        return instance_say(instance, REFUSED,
+        return instance_say(instance, DISCARDED,
                             "%s = %r: must be 0 in model exchange: a craft that friction stops, holds and lets go is "
                             "not smooth; use co-simulation",
                             variable->name, value);
     const char *why = broken_rule(variable->rule, value);
     if (why)
-        return instance_say(instance, REFUSED, variable->rule == STEP_SIZE_RULE ? "%s = %r s: %s" : "%s = %r: %s",
+        return instance_say(instance, DISCARDED, variable->rule == STEP_SIZE_RULE ? "%s = %r s: %s" : "%s = %r: %s",
                             variable->name, value, why);
     return FINE;
 }
@@ -247,7 +247,7 @@ static enum verdict check_integer(struct instance *instance, const struct variab
     if ((reference == V_ERROR_ESTIMATE || reference == V_ERROR_ESTIMATE_NUMBER) && value == ON &&
         instance->now.use == MODEL_EXCHANGE)
         why = "must be off in model exchange: there the error is that of the importer's solver; use co-simulation";
-    return why ? instance_say(instance, REFUSED, "%s = %i: %s", variable->name, (long long)value, why) : FINE;
+    return why ? instance_say(instance, DISCARDED, "%s = %i: %s", variable->name, (long long)value, why) : FINE;
 }
 
 enum verdict instance_check_start(struct instance *instance, unsigned reference, double value)

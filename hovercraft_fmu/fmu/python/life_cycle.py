@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 from collections.abc import MutableMapping
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NoReturn, TypeVar
 
 from ...model.subcycling import check_tolerance, rounding
 from ..variable import Model, Phase, Variable, may_be_set
@@ -119,6 +119,10 @@ class Slave(WrappedSlave):
         if self._phase is not phase:
             raise RuntimeError(f"{call} in state '{self._phase.value}': must be called in state '{phase.value}'")
 
+    def _refuse_to_be_read(self, call: str) -> NoReturn:
+        now, *others = (phase.value for phase in (self._phase, Phase.INITIALIZING, Phase.STEPPING))
+        raise RuntimeError(f"{call} in state '{now}': must be called in state '{others[0]}' or '{others[1]}'")
+
     def _started(self) -> bool:
         return self._phase in (Phase.STEPPING, Phase.TERMINATED)
 
@@ -177,6 +181,8 @@ class Slave(WrappedSlave):
         raise _unknown("String", vrs[0])
 
     def _get(self, table: MutableMapping[int, Number], kind: str, vrs: list[int]) -> list[Number]:
+        if self._phase is Phase.INSTANTIATED:
+            self._refuse_to_be_read(f"fmi2Get{kind.split()[0]}")
         self._observe_discrete()
         try:
             return [table[reference] for reference in vrs]
@@ -195,6 +201,8 @@ class Slave(WrappedSlave):
 
     def _look(self) -> None:
         """Bring what is seen up to the communication point."""
+        if self._phase is Phase.INSTANTIATED:
+            self._refuse_to_be_read("fmi2GetReal")
         if not self._started():
             self._take_up_start_values()
         self._seen, self._all_seen, self._stale = self._observe(), False, False
