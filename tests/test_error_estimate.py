@@ -5,20 +5,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from fmpy.fmi1 import FMICallException
 
 from hovercraft_fmu.elsewhere import COMMUNICATION_STEP, CONTROLS, INPUT_REFERENCES
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON
-from hovercraft_fmu.fmu.interface import ERROR_LOST, ERRORS, MOTION, STATES
+from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, ERROR_LOST, ERRORS, MOTION, STATES
 from hovercraft_fmu.fmu.start_values import variant
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.error_estimate import LARGEST, Companion, accompany, error_factor, estimated_error
 from hovercraft_fmu.model.integrators import INTEGRATORS, Integrator, integrator_number
 from hovercraft_fmu.model.subcycling import Settings, advance
-from hovercraft_fmu.scenes import SCENES
+from hovercraft_fmu.scenes import SCENES, Scene, held
 from hovercraft_fmu.simulation import Value, simulate
+from hovercraft_fmu.studies.estimates import KINDS, REPORTED, SEGMENTS, judged, sampled, shares
+from hovercraft_fmu.studies.reference_end import reference_end
 from hovercraft_fmu.sweep import load, sweep
 from hovercraft_fmu.view.animation import Track
 from tests.lowlevel import another, count, get, kept, one, put, reference, start
@@ -355,3 +358,28 @@ def test_the_batch_tells_no_error(place: str, tmp_path: Path) -> None:
     study["sweep"] |= {"error_estimate": ["off", "on"]} if place == "sweep" else {}
     with pytest.raises(ValueError, match="error_estimate: must be off with the engine batch"):
         sweep(study, engine="batch", output=tmp_path)
+
+
+# ---- the study
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.usefixtures("fleet")
+def test_the_study_is_held_against_scipy(kind: str) -> None:
+    """The shortest of some runs, by another solver; and what the FMU would say of it, and does not keep quiet about."""
+    runs = sampled(REPORTED, 8, INTEGRATORS[0], kind)
+    found = judged(runs, INTEGRATORS[0])
+    i = int(np.argmin(runs.duration))
+    stop = SEGMENTS * float(runs.duration[i])
+    rows = [
+        (k * float(runs.duration[i]), *(float(values[i]) for values in np.broadcast_arrays(*held_controls[:3])))
+        for k, held_controls in enumerate(runs.controls)
+    ]
+    craft = runs.crafts.one(i)
+    parameters = {name: getattr(craft, name) for name in CRAFT_PARAMETERS}
+    start = State(*(float(np.ravel(each)[i % np.size(each)]) for each in runs.start))
+    end, _ = reference_end(Scene("", "", held(stop, *rows), parameters=parameters, start=start), stop)
+    assert (found["x"][i], found["y"][i]) == pytest.approx(end[:2], abs=1e-6)
+    (row,) = shares(found.with_columns(kind=pl.lit(kind), method=pl.lit("any"))).to_dicts()
+    assert (row["runs"], row["missed"]) == (8, 0)
+    assert row["within_factor_2"] == 1.0

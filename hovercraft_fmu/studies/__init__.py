@@ -22,6 +22,9 @@ MEASUREMENTS: Mapping[str, Measurement] = {
     "stability": Measurement("stability", "where each method breaks: limits of the step; random extremes", "2 minutes"),
     "scene-terms": Measurement("scene_terms", "what each opt-in term costs, and what leaving it out does", "3 minutes"),
     "coupling": Measurement("closed_loop", "what the communication step of the closed loop costs", "1 minute"),
+    "error-estimate": Measurement(
+        "estimates", "what the FMU says of its error, beside it; what is advised for every scene", "2 minutes"
+    ),
     "step-costs": Measurement("step_costs", "a sub-step, a host's calls: native, Python FMU, bare model", "1 minute"),
     "sweeps": Measurement("sweep_costs", "a run of a sweep, beside fmpy's own way", "10 minutes"),
 }

@@ -43,8 +43,6 @@ ORDER_STEPS = (0.1, 0.05, 0.025, 0.0125)
 """s: the range in which the observed orders are fitted; rk4 gets five times as long ones."""
 ORDER_SCENES = ("launch", "cycloid", "turn", "crosswind", "stop", "drift_to_rest")
 ROUNDS = 3
-DECADES = tuple(10.0**-k for k in range(10))
-"""m"""
 
 Points: TypeAlias = Sequence[tuple[float, float, Controls]]
 """(start, end) [s] of every communication step, and the controls that hold in it."""
@@ -160,25 +158,12 @@ def measured(instance: Instance, scenes: Sequence[Scene], rounds: int, tell: Tel
                 "substeps": own.found.substeps, "spread": max(own.spread, other.spread),
             })  # fmt: skip
     found = pl.DataFrame(rows)
-    best = winners(found)
     return Findings(
-        {"work_precision": found, "winners": best},
-        [Shown(f"The cheapest method (bare) for a position error after {STOP_TIME:g} s", best)],
-        {"work_precision": draw_work_precision(found)},
-        [spread(timed.values())],
+        {"work_precision": found}, [], {"work_precision": draw_work_precision(found)}, [spread(timed.values())]
     )
 
 
 # ---- what follows from the rows
-
-
-def winners(found: pl.DataFrame) -> pl.DataFrame:
-    """For each scene and accuracy the method that is the cheapest on the bare model; '' where none gets there."""
-    rows = []
-    for (scene,), own in found.sort("bare_cost").group_by("scene", maintain_order=True):
-        first = {f"{a:g} m": own.filter(pl.col("position_error") <= a)["integrator"].head(1) for a in DECADES}
-        rows.append({"scene": scene, **{name: "".join(methods) for name, methods in first.items()}})
-    return pl.DataFrame(rows).sort(pl.col("scene").cast(pl.Enum(list(SCENES))))
 
 
 ADVICE = {
