@@ -1,5 +1,6 @@
 """The FMU in anybody's hands: life cycle, state, faults, many at once, odd steps."""
 
+import itertools
 import math
 import random
 from collections.abc import Callable, Iterator
@@ -648,6 +649,28 @@ def test_a_start_time_other_than_zero(instance: Any) -> None:
         ends.append([*get(instance, *STATES), count(instance)])
     assert ends[0][-1] == 300
     assert ends == [ends[0]] * 4
+
+
+@settings(max_examples=25)
+@given(
+    time=st.one_of(st.sampled_from([86_400.0, 1.7e9]), numbers(-1e9, 1e9)),
+    size=st.one_of(st.sampled_from([0.001, 0.01]), numbers(5e-4, 0.1)),
+    many=st.integers(1, 20),
+)
+def test_any_start_time_gives_the_bits_of_a_start_at_zero(
+    time: float, size: float, many: int, shared: tuple[Any, list[str]]
+) -> None:
+    instance, _ = shared
+    seen = []
+    for begin in (0.0, time):
+        instance.reset()
+        start(instance, begin, step_size=size)
+        points = [begin + k * (many * size) for k in range(4)]
+        for point, end in itertools.pairwise(points):
+            instance.doStep(point, end - point)
+        seen.append([*get(instance, *STATES), count(instance)])
+    assert seen[0] == seen[1]
+    assert seen[0][-1] == 3 * many
 
 
 @pytest.mark.parametrize("time", [0.0, 86_400.0, 1.7e9])
