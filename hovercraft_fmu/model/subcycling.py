@@ -85,6 +85,8 @@ def meant_step(time: float, step: float, start_time: float, step_size: float) ->
     if not ratio <= MAX_SUBSTEPS + 1:
         return step
     whole = (round(ratio) or 1) * step_size
+    if whole == step:
+        return step
     largest = max(abs(time), abs(time + step), abs(start_time))
     return whole if abs(whole - step) <= rounding(largest, step) else step
 

@@ -96,7 +96,9 @@ class Slave(WrappedSlave):
         time, start_time, stop_time, end = self._time, self._start_time, self._stop_time, point + step
         if not 0.0 < step < math.inf:
             raise ValueError(f"communicationStepSize = {step!r} s: must be a finite number greater than 0")
-        same = rounding(max(abs(time), abs(end), abs(start_time)), step, (time - start_time) / step)
+        same = 0.0
+        if point != time or end > stop_time:  # rarely; it costs as much as a sub-step
+            same = rounding(max(abs(time), abs(end), abs(start_time)), step, (time - start_time) / step)
         if not abs(point - time) <= same:
             raise ValueError(f"currentCommunicationPoint = {point!r} s: must be where the last step ended, {time!r} s")
         spacing = math.ulp(min(abs(point), abs(end)))
