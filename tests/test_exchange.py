@@ -12,7 +12,7 @@ from fmpy.fmi1 import FMICallException
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hovercraft_fmu.fmu.interface import BY_NAME, DERIVATIVES, INPUT_HELD, INPUTS, MOTION, STATES, WATCHED
+from hovercraft_fmu.fmu.interface import BY_NAME, DERIVATIVES, ERRORS, INPUT_HELD, INPUTS, MOTION, STATES, WATCHED
 from hovercraft_fmu.host import read_description
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import (
@@ -436,4 +436,4 @@ def test_the_model_structure(description: Any) -> None:
     assert description.modelExchange.canGetAndSetFMUstate
     assert description.modelExchange.canSerializeFMUstate
     initial = {unknown.variable.name for unknown in description.initialUnknowns}
-    assert initial == {*MOTION, *DERIVATIVES[3:], "projected_area"}
+    assert initial == {*MOTION, *DERIVATIVES[3:], *ERRORS, "projected_area"}
