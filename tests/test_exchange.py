@@ -278,6 +278,28 @@ def test_no_completed_step_leads_past_the_stop_time(instance: Any, messages: lis
     assert instance.completedIntegratorStep() == (False, False)
 
 
+@pytest.mark.parametrize("begin", [0.0, 1.7e9])
+def test_the_solvers_time_is_told_wherever_it_starts(begin: float, instance: Any, messages: list[str]) -> None:
+    """The rounding of a solver that adds up its time is none; a hundredth of a second is another time."""
+    instance.setupExperiment(startTime=begin, stopTime=begin + 100.0)
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    instance.enterContinuousTimeMode()
+    with pytest.raises(FMICallException):
+        instance.setTime(begin - 0.01)
+    assert messages[-1] == f"time = {begin - 0.01!r} s: must not be before startTime = {begin!r} s"
+    time = begin
+    for _ in range(300):
+        time += 1.0 / 3.0
+        instance.setTime(time)
+        instance.completedIntegratorStep()
+    assert abs(time - begin - 100.0) < 1e-4
+    instance.setTime(begin + 100.01)
+    with pytest.raises(FMICallException):
+        instance.completedIntegratorStep()
+    assert "must not lead past stopTime" in messages[-1]
+
+
 def test_an_input_outside_its_limits_is_told_once(instance: Any, messages: list[str]) -> None:
     go(instance)
     put(instance, thrust=99.0)
