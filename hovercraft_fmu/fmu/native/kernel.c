@@ -6,13 +6,6 @@
 #include "root.h"
 #include "trig.h"
 
-/* Without it a compiler calls what a sub-step is made of, and keeps its numbers in memory meanwhile. */
-#ifdef __GNUC__
-#define ALWAYS_INLINE inline __attribute__((always_inline))
-#else
-#define ALWAYS_INLINE inline
-#endif
-
 static const double MIN_STEP = 1e-12;     /* s: below it the adaptive method gives up */
 static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
 static const double NEAR_REST = 4.0;      /* sub-steps in which friction could stop the craft */
@@ -28,7 +21,7 @@ static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds wh
 /* With HOVERCRAFT_LIBM the platform's functions, which Python uses, too. */
 #ifdef HOVERCRAFT_LIBM
 
-static inline struct trig_pair sine_cosine(double angle, struct trig_turn *turn)
+static ALWAYS_INLINE struct trig_pair sine_cosine(double angle, struct trig_turn *turn)
 {
     (void)turn;
     return (struct trig_pair){sin(angle), cos(angle)};
@@ -41,7 +34,7 @@ static double natural_logarithm(double x)
 
 #else
 
-static inline struct trig_pair sine_cosine(double angle, struct trig_turn *turn)
+static ALWAYS_INLINE struct trig_pair sine_cosine(double angle, struct trig_turn *turn)
 {
     return trig_sine_cosine(angle, turn);
 }
@@ -220,13 +213,17 @@ static void steer(struct load_function *f, const struct controls *controls)
     f->wind_y = held.wind_y;
 }
 
-/* The controls at a time [s] after the start. */
-static inline void steer_at(struct load_function *f, double time)
+static NEVER_INLINE void steer_now(struct load_function *f, double time)
 {
-    if (f->drive->varies) {
-        const struct controls controls = kernel_controls_at(f->drive, f->begun + time);
-        steer(f, &controls);
-    }
+    const struct controls controls = kernel_controls_at(f->drive, time);
+    steer(f, &controls);
+}
+
+/* The controls at a time [s] after the start. */
+static ALWAYS_INLINE void steer_at(struct load_function *f, double time)
+{
+    if (f->drive->varies)
+        steer_now(f, f->begun + time);
 }
 
 struct friction_radius kernel_friction_radius(const struct craft *craft)

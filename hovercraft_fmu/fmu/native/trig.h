@@ -74,7 +74,7 @@ static const double TRIG_S1 = -1.66666666666666324348e-01, /* 0xBFC55555, 0x5555
     } while (0)
 
 /* Of n quarter turns and y + tail. */
-static inline struct trig_pair trig_of_rest(int n, double y, double tail)
+static ALWAYS_INLINE struct trig_pair trig_of_rest(int n, double y, double tail)
 {
     double s, c;
     TRIG_POLYNOMIALS(double, y, tail, s, c);
@@ -86,7 +86,7 @@ static inline struct trig_pair trig_of_rest(int n, double y, double tail)
 }
 
 /* Of an angle [rad] of any size, each within one unit in the last place; NaN for an infinite one. */
-static inline struct trig_pair trig_sine_cosine(double angle, struct trig_turn *turn)
+static ALWAYS_INLINE struct trig_pair trig_sine_cosine(double angle, struct trig_turn *turn)
 {
     const double size = fabs(angle);
     if (size <= TRIG_QUARTER)
