@@ -99,6 +99,18 @@ def test_a_host_that_sets_nothing_changes_no_bit(term: str, opened: Fmu) -> None
             assert craft.port(*STATES).get() == expected, method
 
 
+def test_an_error_estimate_follows_the_inputs_too(opened: Fmu) -> None:
+    """Its companion asks for itself: not a bit of the path changes, and with right inputs RK4 is told to be right."""
+    start = {"integrator": "rk4", "step_size": 0.125}
+    expected = sailed(opened, start, steered, None, STEP)
+    with opened.instance(intermediate=Intermediate(STEERED, steered)) as craft:
+        craft.start(start | {"error_estimate": "on"})
+        for k in range(round(4.0 / STEP)):
+            craft.step(k * STEP, STEP)
+        assert craft.port(*STATES).get() == expected
+        assert 0.0 < craft.port("error.position").get()[0] < 1e-5
+
+
 def times_asked(opened: Fmu, method: str, yaw_rate: float = 0.0) -> list[float]:
     """In a step of STEP from 100 s."""
     times: list[float] = []
