@@ -101,7 +101,7 @@ def test_a_host_that_sets_nothing_changes_no_bit(term: str, opened: Fmu) -> None
 
 def test_an_error_estimate_follows_the_inputs_too(opened: Fmu) -> None:
     """Its companion asks for itself: not a bit of the path changes, and with right inputs RK4 is told to be right."""
-    start = {"integrator": "rk4", "step_size": 0.125}
+    start: dict[str, float | str] = {"integrator": "rk4", "step_size": 0.125}
     expected = sailed(opened, start, steered, None, STEP)
     with opened.instance(intermediate=Intermediate(STEERED, steered)) as craft:
         craft.start(start | {"error_estimate": "on"})
