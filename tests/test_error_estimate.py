@@ -383,3 +383,25 @@ def test_the_study_is_held_against_scipy(kind: str) -> None:
     (row,) = shares(found.with_columns(kind=pl.lit(kind), method=pl.lit("any"))).to_dicts()
     assert (row["runs"], row["missed"]) == (8, 0)
     assert row["within_factor_2"] == 1.0
+
+
+# ---- inputs that change inside a step
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_inputs_inside_a_step_are_the_companions_too(method: str, each_native_fmu: Path) -> None:
+    """Ramps of FMI 2.0, intermediate update of FMI 3.0: the motion keeps its bits, and the estimate is how far the run
+    is off one with a tolerance of 1e-11.
+    """
+    accuracy: dict[str, Value] = {"integrator": method, "step_size": 0.25, "tolerance": 1e-4}
+    settings: list[dict[str, Value]] = [{"error_estimate": "on", **accuracy}, accuracy]
+    settings.append({"integrator": "adaptive", "tolerance": 1e-11})
+    with_estimate, without, exact = (
+        simulate("slalom", each_native_fmu, start_values=values, communication_step=1.0, stop_time=20.0)
+        for values in settings
+    )
+    for name in STATES:
+        assert np.array_equal(with_estimate[name], without[name])
+    off = np.hypot(*(with_estimate[name] - exact[name] for name in STATES[:2]))[-1]
+    assert off > 1e-9
+    assert with_estimate["error.position"][-1] == pytest.approx(off, rel=0.2)

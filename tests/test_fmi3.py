@@ -159,7 +159,7 @@ BAD_LISTS: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "no output": (
         lambda i: i.getOutputDerivatives([0], [1]),
-        "value reference 0: must be that of an output to have a derivative",
+        "value reference 0: must be that of a continuous output to have a derivative",
     ),
     "seeds": (
         lambda i: i.getDirectionalDerivative([3], [0, 1], [1.0]),

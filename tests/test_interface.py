@@ -63,8 +63,8 @@ TABLE = {
     "drag_area_number": ("parameter", "fixed", "exact", None, "0"),
     "error_estimate": ("parameter", "fixed", "exact", None, "1"),
     "error_estimate_number": ("parameter", "fixed", "exact", None, "0"),
-    "error.position": ("output", "continuous", "calculated", "m", None),
-    "error.heading": ("output", "continuous", "calculated", "rad", None),
+    "error.position": ("output", "discrete", "calculated", "m", None),
+    "error.heading": ("output", "discrete", "calculated", "rad", None),
 }
 
 
@@ -168,4 +168,4 @@ def test_the_head_of_the_description(description: Any, xml: Any) -> None:
 
 def test_the_groups_of_the_table_cover_it() -> None:
     names = [v.name for v in VARIABLES if v.variability == "continuous"]
-    assert names == [*INPUTS[:3], *STATES, *MOTION, *ACTION, *WATCHED, *INPUTS[3:], *ERRORS]
+    assert names == [*INPUTS[:3], *STATES, *MOTION, *ACTION, *WATCHED, *INPUTS[3:]]

@@ -192,7 +192,7 @@ RAMP_FAULTS: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "no output": (
         lambda i: i.getRealOutputDerivatives([0], [1]),
-        "value reference 0: must be that of an output to have a derivative",
+        "value reference 0: must be that of a continuous output to have a derivative",
     ),
 }
 

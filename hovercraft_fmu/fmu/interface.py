@@ -161,10 +161,10 @@ VARIABLES: tuple[Variable, ...] = (
     Variable(47, "error_estimate", "parameter", "fixed", None, OFF, ERROR_ESTIMATE.description + ", in co-simulation",
              kind="Enumeration", minimum=1, maximum=len(ERROR_ESTIMATE.items), enumeration=ERROR_ESTIMATE),
     _number_of(48, "error_estimate", ERROR_ESTIMATE),
-    Variable(49, "error.position", "output", "continuous", "m", None,
+    Variable(49, "error.position", "output", "discrete", "m", None,
              "Estimated distance of the position from the exact solution for the inputs that were given; 0 where "
              f"error_estimate is off, {LARGEST:.0e} where there is none", minimum=0.0, maximum=LARGEST),
-    Variable(50, "error.heading", "output", "continuous", "rad", None,
+    Variable(50, "error.heading", "output", "discrete", "rad", None,
              "Estimated distance of the heading from it, in the same way", minimum=0.0, maximum=LARGEST),
 )  # fmt: skip
 

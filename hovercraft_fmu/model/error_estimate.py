@@ -77,7 +77,7 @@ def watched(companion: Companion, before: State, after: State, craft: Craft) -> 
     dx, dy = after.x - before.x, after.y - before.y
     way, fastest = companion.way + math.sqrt(dx * dx + dy * dy), companion.fastest
     if craft.rubs:
-        fastest = max(fastest, _slip(before, craft), _slip(after, craft))
+        fastest = max(fastest or _slip(before, craft), _slip(after, craft))
     return companion._replace(way=way, fastest=fastest)
 
 
@@ -122,5 +122,8 @@ def is_lost(position: float, state: State, companion: Companion, craft: Craft, s
         return True
     if not craft.rubs:
         return False
-    gain, slip = max(friction_gains(craft, substep)), _slip(state, craft)
-    return slip < NEAR_REST * gain and slip < companion.fastest < FEW * gain
+    gain = max(friction_gains(craft, substep))
+    if not companion.fastest < FEW * gain:
+        return False
+    slip = _slip(state, craft)
+    return slip < NEAR_REST * gain and slip < companion.fastest

@@ -153,8 +153,6 @@ DOOR enum verdict instance_warn_of_held_inputs(struct instance *instance, const 
 DOOR bool instance_has_to_warn(const struct instance *instance);
 /* By its companion, at the communication point; 0 where it has none. */
 DOOR struct error instance_error(const struct content *content);
-/* And how fast it grows [m/s, rad/s]. */
-DOOR struct error instance_error_rate(const struct content *content);
 
 /* ---- variables.c */
 DOOR enum verdict instance_get_reals(struct instance *instance, const unsigned *references, size_t n, double *values);

@@ -903,11 +903,14 @@ void kernel_watch(struct companion *companion, const struct state *before, const
 {
     const double dx = after->x - before->x, dy = after->y - before->y;
     companion->way = companion->way + square_root(dx * dx + dy * dy);
-    if (rubs(craft))
-        companion->fastest = larger(larger(companion->fastest, slip_of(before, craft)), slip_of(after, craft));
+    if (rubs(craft)) {
+        const double fastest = companion->fastest > 0.0 ? companion->fastest : slip_of(before, craft);
+        companion->fastest = larger(fastest, slip_of(after, craft));
+    }
 }
 
-double kernel_error_factor(const struct craft *craft, int order)
+/* What the difference between the two is to be multiplied by. */
+static double error_factor(const struct craft *craft, int order)
 {
     const double gain = (double)(1 << (rubs(craft) && order > FRICTION_ORDER ? FRICTION_ORDER : order));
     return gain / (gain - 1.0);
@@ -917,7 +920,7 @@ struct error kernel_estimated_error(const struct state *state, const struct comp
                                     const struct craft *craft, int order)
 {
     const struct state *other = &companion->state;
-    const double factor = kernel_error_factor(craft, order);
+    const double factor = error_factor(craft, order);
     const double dx = other->x - state->x, dy = other->y - state->y;
     const double position = factor * square_root(dx * dx + dy * dy);
     const double heading = factor * fabs(other->heading - state->heading);
@@ -932,6 +935,9 @@ bool kernel_is_lost(double position, const struct state *state, const struct com
     if (!rubs(craft))
         return false;
     const struct friction friction = friction_function(craft, substep);
-    const double gain = larger(friction.a, friction.b), slip = slip_of(state, craft);
-    return slip < NEAR_REST * gain && slip < companion->fastest && companion->fastest < FEW * gain;
+    const double gain = larger(friction.a, friction.b);
+    if (!(companion->fastest < FEW * gain))
+        return false;
+    const double slip = slip_of(state, craft);
+    return slip < NEAR_REST * gain && slip < companion->fastest;
 }

@@ -144,9 +144,7 @@ HIDDEN void kernel_accompany(struct companion *companion, const struct drive *dr
                              double communication_step, const struct settings *settings, const struct stretch *made);
 HIDDEN void kernel_watch(struct companion *companion, const struct state *before, const struct state *after,
                          const struct craft *craft);
-/* What the difference between the two is to be multiplied by, for a method of that order. */
-HIDDEN double kernel_error_factor(const struct craft *craft, int order);
-/* By now. */
+/* By now, for a method of that order. */
 HIDDEN struct error kernel_estimated_error(const struct state *state, const struct companion *companion,
                                            const struct craft *craft, int order);
 /* Whether such an estimate [m] can be trusted no more, after so many sub-steps of a size [s]; 0 of the adaptive

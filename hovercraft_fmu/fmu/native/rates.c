@@ -39,9 +39,8 @@ enum verdict instance_set_rates(struct instance *instance, const unsigned *refer
 }
 
 /* The derivative of an output at the communication point, after instance_observe_motion and instance_observe_action. */
-static bool output_rate(const struct content *now, unsigned reference, double *rate)
+static bool output_rate(const double *reals, unsigned reference, double *rate)
 {
-    const double *reals = now->reals;
     const double vx = reals[V_VELOCITY_X], vy = reals[V_VELOCITY_Y], r = reals[V_VELOCITY_YAW_RATE];
     const double ax = reals[V_ACCELERATION_X], ay = reals[V_ACCELERATION_Y], speed = reals[V_SPEED];
     const struct state acceleration = {.heading = reals[V_POSE_HEADING], .vx = ax, .vy = ay};
@@ -76,12 +75,6 @@ static bool output_rate(const struct content *now, unsigned reference, double *r
     case V_SPEED: /* at rest it can only grow */
         *rate = speed > 0.0 ? (vx / speed) * ax + (vy / speed) * ay : square_root(ax * ax + ay * ay);
         return true;
-    case V_ERROR_POSITION:
-        *rate = instance_error_rate(now).position;
-        return true;
-    case V_ERROR_HEADING:
-        *rate = instance_error_rate(now).heading;
-        return true;
     default:
         return false;
     }
@@ -94,9 +87,9 @@ enum verdict instance_get_rates(struct instance *instance, const unsigned *refer
     if (instance_observe_motion(instance) == REFUSED || instance_observe_action(instance) == REFUSED)
         return REFUSED;
     for (size_t i = 0; i < n; i++) {
-        if (!output_rate(&instance->now, references[i], &rate))
+        if (!output_rate(instance->now.reals, references[i], &rate))
             return instance_say(instance, REFUSED,
-                                "value reference %u: must be that of an output to have a derivative",
+                                "value reference %u: must be that of a continuous output to have a derivative",
                                 (unsigned long long)references[i]);
         if (check_order(instance, references[i], orders[i], 0.0) == REFUSED)
             return REFUSED;
@@ -106,7 +99,7 @@ enum verdict instance_get_rates(struct instance *instance, const unsigned *refer
                                 VARIABLES[references[i]].name, rate);
     }
     for (size_t i = 0; i < n; i++) {
-        output_rate(&instance->now, references[i], &values[i]);
+        output_rate(instance->now.reals, references[i], &values[i]);
         if (orders[i] > 1)
             values[i] = 0.0;
     }

@@ -110,22 +110,6 @@ struct error instance_error(const struct content *content)
     return kernel_estimated_error(&content->state, &content->companion, &content->craft, method_of(content)->order);
 }
 
-/* Along the difference of the two that of their velocities. */
-struct error instance_error_rate(const struct content *content)
-{
-    const struct state *s = &content->state, *other = &content->companion.state;
-    const double dx = other->x - s->x, dy = other->y - s->y, turned = other->heading - s->heading;
-    const double dvx = other->vx - s->vx, dvy = other->vy - s->vy, turning = other->yaw_rate - s->yaw_rate;
-    const double distance = square_root(dx * dx + dy * dy);
-    if (!content->estimates || isnan(other->x))
-        return (struct error){0.0, 0.0};
-    const double factor = kernel_error_factor(&content->craft, method_of(content)->order);
-    const double apart = distance > 0.0 ? (dx / distance) * dvx + (dy / distance) * dvy
-                                        : square_root(dvx * dvx + dvy * dvy);
-    const double leaves = turned > 0.0 ? turning : turned < 0.0 ? -turning : fabs(turning);
-    return (struct error){factor * apart, factor * leaves};
-}
-
 static enum verdict warn_of_the_step(struct instance *instance)
 {
     const struct content *now = &instance->now;
