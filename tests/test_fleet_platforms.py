@@ -16,6 +16,7 @@ from tests.test_native_platforms import ARM_LIBRARIES, WINE
 
 pytestmark = pytest.mark.once
 FOLDERS = ("-I", str(C_FOLDER), "-I", str(C_FOLDER / "fleet"), "-Wno-psabi")
+LINUX = ("-DBARE", "-nostdlib", "-Wl,--entry=start", "-lc")
 WINDOWS = ("-nostdlib", "-Wl,--entry=start", "-DHOVERCRAFT_NO_LIBC", "-lkernel32", str(C_FOLDER / "memory.c"))
 VECTORS = [option for option in LIBRARY_OPTIONS if "vectorize" in option]
 
@@ -38,13 +39,15 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     """As the library is compiled, with what this processor has."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         pytest.skip("not x86-64 Linux")
-    found = hashes(tmp_path_factory.mktemp("here") / "wide", compiler(PLATFORMS["x86_64-linux"]), *VECTORS)
+    found = hashes(tmp_path_factory.mktemp("here") / "wide", compiler(PLATFORMS["x86_64-linux"]), *VECTORS, *LINUX)
     assert len({line.split()[1] for line in found}) == len(found)
     return found
 
 
 def test_the_same_bits_without_avx2(here: list[str], tmp_path: Path) -> None:
-    assert hashes(tmp_path / "narrow", compiler(PLATFORMS["x86_64-linux"]), *VECTORS, "-DFLEET_BASELINE") == here
+    assert (
+        hashes(tmp_path / "narrow", compiler(PLATFORMS["x86_64-linux"]), *VECTORS, *LINUX, "-DFLEET_BASELINE") == here
+    )
 
 
 def test_the_same_bits_by_another_compiler(here: list[str], tmp_path: Path) -> None:
@@ -56,7 +59,7 @@ def test_the_same_bits_on_arm64(here: list[str], tmp_path: Path) -> None:
     if not qemu or not ARM_LIBRARIES.exists():
         pytest.skip("no qemu-aarch64, or no libraries for it: apt-get install qemu-user libc6-arm64-cross")
     runner = (qemu, "-L", str(ARM_LIBRARIES))
-    assert hashes(tmp_path / "arm", compiler(PLATFORMS["aarch64-linux"]), *VECTORS, runner=runner) == here
+    assert hashes(tmp_path / "arm", compiler(PLATFORMS["aarch64-linux"]), *VECTORS, *LINUX, runner=runner) == here
 
 
 def test_the_same_bits_on_windows(here: list[str], tmp_path: Path) -> None:
