@@ -18,6 +18,7 @@ from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour, mod
 from hovercraft_fmu.fmu.extras import RESULT, terminals
 from hovercraft_fmu.fmu.interface import BY_NAME, HOVERCRAFT, INPUTS, STATES
 from hovercraft_fmu.studies.pages import default_result
+from tests.exchange import get_vector, go, put_states
 from tests.lowlevel import DISCARD, ERROR, everything, one, put, start
 
 FLAVOURS = [PYTHON, NATIVE, NATIVE3, AUTOPILOT]
@@ -172,6 +173,19 @@ def test_a_discarded_step_can_be_tried_otherwise(each_native_fmu: Path, standard
         instance.doStep(0.5, 0.5)
         assert len(messages) == 1
         instance.terminate()
+
+
+def test_derivatives_that_are_no_numbers_are_discarded(each_native_fmu: Path) -> None:
+    """[2.0: 2.1.3; 3.0: 2.2.4, 3.2.1] A solver comes back with a shorter step."""
+    with one(each_native_fmu, exchange=True) as (instance, _):
+        go(instance)
+        for call in (instance.getDerivatives, instance.getContinuousStates):
+            put_states(instance, [0.0, 0.0, 0.0, 1e200, 1e200, 1e200])
+            with pytest.raises(FMICallException) as caught:
+                get_vector(call)
+            assert caught.value.status == DISCARD
+            put_states(instance, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+            assert get_vector(instance.getDerivatives)[0] == 1.0
 
 
 def test_a_discarded_step_that_is_tried_again_as_it_was_is_an_error(each_native_fmu: Path) -> None:
