@@ -115,7 +115,7 @@ def test_bad_options(options: dict[str, Any], message: str) -> None:
 def test_a_result_that_does_not_fit_into_the_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Before the run; by what is free now."""
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=1e6))
-    rule = r"the result of 60000 steps, \d+ numbers of 32 bytes each, must fit into the memory that is free; .* GB"
+    rule = r"the result of 60000 steps, \d+ numbers of 24 bytes each, must fit into the memory that is free; .* GB"
     with pytest.raises(ValueError, match=f"communication_step = 0.001 s: {rule} of 0.001 GB"):
         plan("launch", communication_step=0.001)
     plan("launch", communication_step=0.1)

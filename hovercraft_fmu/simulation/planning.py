@@ -33,8 +33,8 @@ MAX_STEPS = 10**8
 """Communication steps of a run: a year at 0.3 s, or a slip of the decimal point."""
 
 
-NUMBER = 32
-"""Bytes of one while a run is recorded: a float of Python's, and its place in a row. In the array they are 8."""
+NUMBER = 24
+"""Bytes of one at the end of a run: 8 as it was recorded, 8 in all rows, 8 in those of communication points."""
 
 
 class MistakesError(ValueError):
