@@ -89,17 +89,22 @@ static ALWAYS_INLINE struct trig_pair trig_of_rest(int n, double y, double tail)
 static ALWAYS_INLINE struct trig_pair trig_sine_cosine(double angle, struct trig_turn *turn)
 {
     const double size = fabs(angle);
-    if (size <= TRIG_QUARTER)
-        return trig_of_rest(0, angle, 0.0);
-    if (!(size < TRIG_LARGE))
-        return trig_large(angle);
-    const double quarters = angle * TRIG_INVPIO2 + TRIG_TO_INTEGER - TRIG_TO_INTEGER;
-    if (quarters != turn->quarters)
-        trig_turn_to(turn, quarters);
-    const double r = angle - turn->high, y = r - turn->low;
-    if (fabs(y) < 0x1p-16 * size)
-        return trig_near_multiple(angle);
-    return trig_of_rest(turn->n, y, (r - y) - turn->low);
+    double y = angle, tail = 0.0;
+    int n = 0;
+    if (!(size <= TRIG_QUARTER)) {
+        if (!(size < TRIG_LARGE))
+            return trig_large(angle);
+        const double quarters = angle * TRIG_INVPIO2 + TRIG_TO_INTEGER - TRIG_TO_INTEGER;
+        if (quarters != turn->quarters)
+            trig_turn_to(turn, quarters);
+        const double r = angle - turn->high;
+        y = r - turn->low;
+        if (fabs(y) < 0x1p-16 * size)
+            return trig_near_multiple(angle);
+        tail = (r - y) - turn->low;
+        n = turn->n;
+    }
+    return trig_of_rest(n, y, tail);
 }
 
 #endif
