@@ -65,6 +65,11 @@ def test_an_impossible_wish_is_refused(within: float, native_fmu: Path) -> None:
         advise(COAST, native_fmu, within=within)
 
 
+def test_what_is_looked_for_cannot_be_given(native_fmu: Path) -> None:
+    with pytest.raises(ValueError, match="integrator: must not be given: it is what is looked for"):
+        advise(COAST, native_fmu, start_values={"integrator_number": 3})
+
+
 @pytest.mark.usefixtures("native_at_hand")
 def test_the_command_gives_the_command(shell: Shell) -> None:
     (shell.folder / "log.csv").write_text("time,thrust\n0,5\n3,5\n")

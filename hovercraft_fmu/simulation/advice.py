@@ -19,6 +19,7 @@ from .planning import Inputs, Run, method_in_words, plan
 from .points import ends, holding, schedule
 from .result import Result
 
+TRIED = ("integrator", "step_size", "tolerance", "error_estimate")
 WITHIN = 0.01
 """m"""
 CUTS = tuple(part * 10**n for n in range(5) for part in (1, 2, 5))
@@ -100,10 +101,13 @@ def advise(
         tell: called with the part of the work that is done, 0 to 1.
 
     Raises:
-        ValueError: `within` is not a finite number greater than 0; and as `simulate` does, which the runs are made by.
+        ValueError: `within` is not a finite number greater than 0; a start value that is looked for; and as `simulate`
+            does, which the runs are made by.
     """
     if not 0.0 < within < math.inf:
         raise ValueError(f"within = {within!r} m: must be a finite number greater than 0")
+    if given := [name for name in TRIED if name in numbers(start_values or {})]:
+        raise ValueError(f"{given[0]}: must not be given: it is what is looked for")
     run = plan(scene_or_inputs, preset=preset, start_values=start_values, communication_step=communication_step)
     bench = _Bench(run, default_fmu() if fmu is None else fmu, within)
     found: list[Tried] = []
@@ -184,7 +188,7 @@ def _settings(method: Integrator, accuracy: float) -> dict[str, Value]:
 
 
 def _with(run: Run, settings: Mapping[str, Value]) -> Run:
-    return replace(run, start_values={**run.start_values, **numbers(settings)})
+    return replace(run, start_values={**run.start_values, **numbers({"error_estimate": "off", **settings})})
 
 
 def _tried(settings: Mapping[str, Value], method: Integrator, result: Result) -> Tried:
