@@ -626,7 +626,7 @@ def test_clean_under_sanitizers_over_the_life_cycle(sanitized_fmus: list[Path]) 
     env = {**os.environ, "NATIVE_FMU": two, "NATIVE3_FMU": three, "LD_PRELOAD": ":".join(runtime), "CI": "",
            "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=0"}  # fmt: skip
     files = [f"tests/test_{each}.py" for each in ("lifecycle", "native", "exchange", "partial_derivatives", "fmi3")]
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files,
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--assert=plain", *files,
                "-k", "not python and not sanitize and not other_hosts and not bits_of_fmi_2 and not scene",
                "-m", "not hypothesis"]  # fmt: skip
     done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False, timeout=900)

@@ -43,12 +43,16 @@ def test_python_blocks_run(code: str, folder: Path) -> None:
     assert "[" not in done.stdout  # numbers, no arrays
 
 
-def test_the_first_command_is_the_demo() -> None:
-    """Which test_cli.py runs, as a program."""
-    assert commands()[0] == f"{OWN}demo"
+DEMOS = [f"{OWN}demo", f"{OWN}demo --loop"]
 
 
-@pytest.mark.parametrize("command", commands()[1:])
+def test_the_demos_are_those_of_other_tests() -> None:
+    """The first command of all, which test_cli.py runs as a program, and the one that test_loops.py runs."""
+    assert commands()[0] == DEMOS[0]
+    assert [each for each in commands() if "demo" in each] == DEMOS
+
+
+@pytest.mark.parametrize("command", [each for each in commands() if each not in DEMOS])
 @pytest.mark.usefixtures("folder")
 def test_commands_run(command: str, shell: Shell) -> None:
     shell.ok(*shlex.split(command.removeprefix(OWN)))
