@@ -514,6 +514,13 @@ if __name__ == "__main__":
 """
 
 
+def _has_ended(process: psutil.Process) -> bool:
+    try:
+        return process.status() == psutil.STATUS_ZOMBIE  # not everywhere is there somebody who asks what became of it
+    except psutil.NoSuchProcess:
+        return True
+
+
 def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> None:
     study = but(
         sweep={"mass": RANGE},
@@ -530,8 +537,11 @@ def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> 
     assert len(workers) >= 2
     process.kill()
     process.wait()
-    psutil.wait_procs(workers, timeout=60)
-    assert not any(each.is_running() for each in workers)  # they end with the process that started them
+    for _ in range(6000):  # or they have not ended with the process that started them
+        if all(_has_ended(each) for each in workers):
+            break
+        time.sleep(0.01)
+    assert all(_has_ended(each) for each in workers)
     made = len(list(there.glob("*.parquet")))
     assert 2 <= made < 16
     kept = {path: path.stat().st_mtime_ns for path in there.glob("*.parquet")}
