@@ -240,7 +240,7 @@ def test_a_step_of_no_time_is_an_error(instance: Any) -> None:
         ({"step_size": 0.0}, "step_size = 0.0 s: must be a finite number greater than 0"),
         ({"integrator": 99}, "integrator = 99: must be one of 1 (semi_implicit_euler)"),
         ({"thrust_min": 20.0}, "thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"),
-        ({"thrust": float("inf")}, "thrust = inf: must be a finite number"),
+        ({"wind.x": float("inf")}, "wind.x = inf: must be a finite number"),
         ({"velocity.x": 1e200}, "speed = inf: must be a finite number; the motion is out of range"),
         ({"velocity.x": 1e150}, "velocity.x = nan after 0.0 s: must stay a finite number"),
         ({"step_size": 1e-12}, "must not need more than 10^9 sub-steps of step_size = 1e-12 s"),
