@@ -58,8 +58,10 @@ DRAWN: Mapping[str, Callable[[pl.DataFrame], "Figure"]] = {
     "work_precision.svg": work_precision.draw_work_precision,
 }
 """Those that are drawn of their table alone."""
-COLORS = 32
+COLORS = 24
 """Of a picture's palette: lines and markers need few."""
+COLORS_OF_LOOP = 32
+"""With fewer its two thrusters look alike."""
 SHOWS = "Shows"
 """The key in a picture under which it says what it shows."""
 
@@ -81,10 +83,10 @@ def shown(name: str) -> str:
     return digest({path.name: path.read_bytes() for path in PICTURES[name]})
 
 
-def in_palette(picture: Path, shows: str) -> bytes:
+def in_palette(picture: Path, shows: str, colors: int = COLORS) -> bytes:
     """A PNG as small as it can be, which says what it shows."""
     with Image.open(picture) as colored:
-        image = colored.convert("RGB").quantize(COLORS, Image.Quantize.MEDIANCUT, kmeans=6, dither=Image.Dither.NONE)
+        image = colored.convert("RGB").quantize(colors, Image.Quantize.MEDIANCUT, kmeans=6, dither=Image.Dither.NONE)
     note, content = PngImagePlugin.PngInfo(), io.BytesIO()
     note.add_text(SHOWS, shows)
     image.save(content, "PNG", optimize=True, pnginfo=note)
@@ -114,7 +116,9 @@ def assemble(results: Path = RESULTS) -> list[Path]:
             picture = next((each / name for each in (Path(folder), results) if (each / name).exists()), None)
             if picture:
                 files[PACKED / name] = in_palette(picture, shown(name))
-        files[pilot_package.HERE / pilot_package.PICTURE] = in_palette(Path(folder) / pilot_package.PICTURE, "")
+        files[pilot_package.HERE / pilot_package.PICTURE] = in_palette(
+            Path(folder) / pilot_package.PICTURE, "", COLORS_OF_LOOP
+        )
         files[RESULT] = default_result(build_native_fmu(Path(folder) / "HovercraftNative.fmu"))
     for path, content in files.items():
         path.write_bytes(content)
