@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, reject
 from hypothesis import strategies as st
 
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator, integrator_number
-from hovercraft_fmu.model.subcycling import Settings, advance
+from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance
 from hovercraft_fmu.scenes import COAST_SPEED, SCENES
 from tests.strategies import calm_crafts, controls, crafts, numbers, rubbing_crafts, states
 from tests.test_scenes import EXACT, NAMES
@@ -167,7 +167,10 @@ def test_what_is_watched_does_not_depend_on_how_the_time_is_cut(
 ) -> None:
     """Of the sub-steps it is the largest: maxima of different ones are not put together."""
     way = Settings(0.001, each)
-    whole = advance(state, asked, craft, 0.04, way)
+    try:
+        whole = advance(state, asked, craft, 0.04, way)
+    except NonFiniteError:
+        reject()  # so light a craft, so fast, that the sub-step is too long for it
     parts = [whole._replace(state=state)]
     for _ in range(40):
         parts.append(advance(parts[-1].state, asked, craft, 0.001, way))
