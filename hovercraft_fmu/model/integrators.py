@@ -63,7 +63,9 @@ def semi_implicit_euler(state: State, controls: Controls, craft: Craft, h: float
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
         push_x, push_y, turn, kq = push_at(heading, vx, vy, yaw_rate)
-        most = max(most, kq * drag_rate + abs(yaw_rate) * spin_rate)
+        rate = kq * drag_rate + abs(yaw_rate) * spin_rate
+        if rate > most:
+            most = rate
         vx = vx + push_x
         vy = vy + push_y
         yaw_rate = yaw_rate + turn
@@ -72,7 +74,10 @@ def semi_implicit_euler(state: State, controls: Controls, craft: Craft, h: float
         x = x + h * vx
         y = y + h * vy
         heading = heading + h * yaw_rate
-        left, right = min(left, yaw_rate), max(right, yaw_rate)
+        if yaw_rate > right:
+            right = yaw_rate
+        elif yaw_rate < left:
+            left = yaw_rate
     most = max(most, push_at(heading, vx, vy, yaw_rate)[3] * drag_rate + abs(yaw_rate) * spin_rate)
     return Stretch(State(x, y, heading, vx, vy, yaw_rate), n, h * most, h * max(right, -left))
 
@@ -145,7 +150,9 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     most, left, right = 0.0, yaw_rate, yaw_rate
     for _ in range(n):
         kq = loads_at(heading, vx, vy, yaw_rate)[3]
-        most = max(most, kq * drag_rate + abs(yaw_rate) * spin_rate)
+        rate = kq * drag_rate + abs(yaw_rate) * spin_rate
+        if rate > most:
+            most = rate
         c = cos(heading)
         s = sin(heading)
         g = h * kq

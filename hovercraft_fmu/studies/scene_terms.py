@@ -78,13 +78,16 @@ TERMS = (
 def walk(scene: Scene, settings: Mapping[str, Value]) -> Ready[list[State]]:
     """The whole scene on the bare model: the states at its own communication points."""
     run = plan(scene, start_values=settings)
-    size = run.settings.step_size
-    steps = [(meant_step(time, end - time, run.start_time, size), controls) for time, end, controls in held_steps(run)]
+    craft, settled = run.craft, run.settings
+    steps = [
+        (meant_step(time, end - time, run.start_time, settled.step_size), controls)
+        for time, end, controls in held_steps(run)
+    ]
 
     def go() -> list[State]:
         states = [run.start]
         for duration, controls in steps:
-            states.append(advance(states[-1], controls, run.craft, duration, run.settings).state)
+            states.append(advance(states[-1], controls, craft, duration, settled).state)
         return states
 
     return lambda: go
