@@ -199,7 +199,7 @@ def draw(found: pl.DataFrame) -> "Figure":
             axes.plot(ends, factor * ends, color=INK, linewidth=0.8 if factor == 1.0 else 0.4)
         for name in METHODS:
             axes.plot([], [], ".", color=METHODS[name].color, label=name)
-        axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="off at the end [m]")
-        axes.set_title(f"{kind}: estimate [m]; lines at half, once and twice the error", loc="left", fontsize="small")
+        axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="off at the end [m]", ylabel="estimate [m]")
+        axes.set_title(f"{kind}; lines: half, once, twice", loc="left", fontsize="small")
     axes.legend(frameon=False, markerscale=3.0, fontsize="small")
     return figure
