@@ -228,7 +228,7 @@ of FMI 3.0 without a word; fmpy.ssp loads every FMU as one of FMI 2.0."""
 
 
 @pytest.mark.once
-@pytest.mark.parametrize(("flavour", "name"), WAYS, indirect=["flavour"])
+@pytest.mark.parametrize(("flavour", "name"), WAYS, indirect=["flavour"], scope="session")
 def test_every_master_gives_the_bits_of_ours(name: str, each_fmu: Path, autopilot: Path, tmp_path: Path) -> None:
     if missing := HOSTS[name.split(",")[0].split(".")[0]].missing():
         pytest.skip(f"{name}: {missing}")

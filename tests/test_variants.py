@@ -103,7 +103,7 @@ IN_HOSTS = [
 """All hosts with one of the FMUs, and each of the others with some: what runs in which host is test_hosts.py's."""
 
 
-@pytest.mark.parametrize(("flavour", "host"), IN_HOSTS, indirect=["flavour"])
+@pytest.mark.parametrize(("flavour", "host"), IN_HOSTS, indirect=["flavour"], scope="session")
 def test_every_host_runs_its_start_values(host: str, ice: Path, each_fmu: Path) -> None:
     if missing := elsewhere.hosts_of(each_fmu)[host].missing():
         pytest.skip(f"{host}: {missing}")
