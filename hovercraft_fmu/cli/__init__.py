@@ -1,0 +1,69 @@
+"""The command hovercraft-fmu: a thin layer over the functions of the package.
+
+A command loads what it needs when it runs: `--help` is there at once.
+"""
+
+import sys
+
+import click
+
+from .._version import __version__
+from . import demos, files, many, running
+from .output import OUTPUT, one_line
+
+__all__ = ["OUTPUT", "commands", "main"]
+
+EXPECTED = (ValueError, OSError, ArithmeticError, ModuleNotFoundError)
+"""What a wrong name, file or value ends in, beside what an FMU refuses: one line, no traceback."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command and leave the process: status 0, or 1 after a line for each thing that is wrong."""
+    try:
+        status = commands.main(arguments, prog_name="hovercraft-fmu", standalone_mode=False)
+    except click.exceptions.Abort:
+        sys.exit("hovercraft-fmu: stopped")
+    except click.ClickException as error:
+        sys.exit(f"hovercraft-fmu: {error.format_message()}")
+    except EXPECTED as error:
+        sys.exit("\n".join(f"hovercraft-fmu: {line}" for line in getattr(error, "mistakes", (one_line(error),))))
+    except RuntimeError as error:
+        from ..host import SimulationError
+
+        if not isinstance(error, SimulationError):
+            raise
+        sys.exit("hovercraft-fmu: " + one_line(error))
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, message="%(version)s")
+@click.pass_context
+def commands(context: click.Context) -> None:
+    """Build, check, run and draw the hovercraft FMU.
+
+    \b
+    New here?
+      hovercraft-fmu demo                          build, check and drive it; see build/demo/
+      hovercraft-fmu demo --loop                   the same with an autopilot at the helm
+      hovercraft-fmu build                         write the FMUs and the SSP files into build/
+      hovercraft-fmu drive                         the arrow keys, in a window
+      hovercraft-fmu simulate --scene turn --plot turn.png
+      hovercraft-fmu simulate --help               what can be set
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+for each in (
+    files.build,
+    running.simulate,
+    running.advise,
+    running.drive,
+    files.validate,
+    demos.demo,
+    many.measure,
+    many.sweep,
+    files.cross_check,
+):
+    commands.add_command(each)

@@ -1,0 +1,87 @@
+"""The command demo: the whole way at once, and what to try next."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .files import validated
+from .options import FOLDER
+from .output import OUTPUT, print_rows, progress_of
+from .running import print_result, simulated, write
+
+if TYPE_CHECKING:
+    from ..building import Kind
+    from ..coupling import Passage
+
+DEMO_FOLDER = FOLDER / "demo"
+
+
+@click.command()
+@click.option("--loop", is_flag=True, help="The closed loop: an autopilot FMU takes it round a course in a crosswind.")
+def demo(loop: bool) -> None:
+    """Build the FMUs, check them, and drive them over a recorded control log; see build/demo/."""
+    from ..building import default_kind
+    from ..scenes import CONTROL_LOGS, SCENES
+    from ..simulation import holding, plan
+    from ..view.plots import check_plot
+
+    picture = check_plot(DEMO_FOLDER / ("loop.png" if loop else "ice.png"))
+    native = _built_and_valid(default_kind())
+    if loop:
+        return _demo_of_the_loop(native, _built_and_valid("autopilot"), picture)
+    python = _built_and_valid("python")
+    run = plan(CONTROL_LOGS / "ice.csv", preset="ice", communication_step=SCENES["ice"].communication_step)
+    result, one, other = (simulated(*each) for each in ((run, native), (holding(run), native), (holding(run), python)))
+    print_result(result)
+    largest, column = max((float(abs(one[name] - other[name]).max()), name) for name in one.names)
+    OUTPUT.print(
+        f"{native.name} and {python.name} agree where inputs hold over each communication step: of {len(one.names)} "
+        f"columns and {len(one['time'])} rows the largest difference is {largest:.2g}, of {column}"
+    )
+    write(result, DEMO_FOLDER / "ice.csv", picture)
+    OUTPUT.print(
+        "\nWorth trying next:\n"
+        "  hovercraft-fmu simulate --scene turn --plot build/turn.png\n"
+        "  hovercraft-fmu simulate --scene ice --set mass=200 --plot build/heavy.png\n"
+        "  hovercraft-fmu simulate --list-scenes"
+    )
+    return None
+
+
+def _built_and_valid(kind: "Kind") -> Path:
+    from ..building import build
+
+    fmu = build(kind)
+    OUTPUT.print(f"built {fmu}")
+    if validated(fmu):
+        raise click.ClickException("the FMU is not valid")
+    return fmu
+
+
+def _demo_of_the_loop(fmu: Path, autopilot: Path, picture: Path) -> None:
+    from ..coupling import sail
+    from ..scenes import VOYAGES
+    from ..view.plots import plot_passage
+
+    voyage = VOYAGES["crosswind"]
+    with progress_of(voyage.stop_time) as progress:
+        passage = sail(voyage, fmu, autopilot, progress=progress)
+    _print_passage(passage)
+    OUTPUT.print(f"wrote {passage.write_csv(DEMO_FOLDER / 'loop.csv')}")
+    OUTPUT.print(f"wrote {plot_passage(passage, picture)}")
+
+
+def _print_passage(passage: "Passage") -> None:
+    off = abs(passage["cross_track_error"])
+    arrived = f"after {passage['time'][-1]:g} s" if passage.arrived else "no"
+    distance = passage.distance
+    print_rows(
+        f"{passage.voyage.name}: {passage.voyage.description}",
+        {
+            "waypoints reached": f"{int(passage['waypoint'][-1]) - (not passage.arrived)} of {len(passage.waypoints)}",
+            "arrived": arrived,
+            "distance": f"{distance:.2f} m, {distance / passage.craft.length:.1f} craft lengths",
+            "off the legs": f"{off.mean():.2f} m in the mean, {off.max():.2f} m where a leg begins",
+        },
+    )

@@ -1,0 +1,113 @@
+"""The commands that make many runs: measure, sweep."""
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import click
+from rich.progress import MofNCompleteColumn, ProgressColumn, Task
+from rich.table import Table
+from rich.text import Text
+
+from ..studies import MEASUREMENTS, carry_out
+from .options import FOLDER, PathOf, make_room, named_fmu, of_an_fmu
+from .output import OUTPUT, progress_of
+
+if TYPE_CHECKING:
+    from ..building import Kind
+
+MEASURE = """Measure the product: what speed costs, what accuracy costs, where the methods break.
+
+NAME is one of these; what each takes is on a machine with nothing else to do:
+
+\b
+"""
+MEASURE += "\n".join(f"  {name:12} {each.what} ({each.takes})" for name, each in MEASUREMENTS.items())
+
+
+@click.command(help=MEASURE)
+@click.argument("name", metavar="NAME", type=click.Choice(list(MEASUREMENTS)))
+@click.option("--quick", is_flag=True, help="Fewer cases: below half a minute.")
+@click.option(
+    "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR", help="Default: build/measure/NAME."
+)
+def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 - MEASURE
+    folder = output or FOLDER / "measure" / name
+    with progress_of(1.0, f"measuring {name}") as tell:
+        report = carry_out(name, quick, folder, tell)
+    OUTPUT.print(f"{report}\n\nwrote {folder}/")
+
+
+@click.command("sweep")
+@click.argument("study")
+@of_an_fmu
+@click.option("--engine", metavar="NAME", default="fmu", show_default=True,
+              help="fmu, or batch: the compiled kernel, all craft at once, with the native FMU's bits.")  # fmt: skip
+@click.option("--workers", type=int, metavar="N", help="Processes on this machine. Default: one a processor.")
+@click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
+@click.option(
+    "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR",
+    help="Default: build/sweep/ and the study.",
+)  # fmt: skip
+@click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png", help="Draw the results.")
+def sweep(
+    study: str,
+    fmu: Path | None,
+    kind: "Kind | None",
+    output: Path | None,
+    plot: Path | None,
+    engine: str,
+    **options: Any,
+) -> None:
+    """Make many runs of one FMU, in parallel, into Parquet files.
+
+    STUDY is a TOML file, or the name of a study of the package: turning_circle. FMU is the file; without it
+    build/HovercraftNative.fmu, which is built if it is not there. A sweep that was ended goes on where it was with the
+    same command.
+    """
+    from ..sweep import read_study, sweep
+
+    chosen = read_study(study)
+    if plot:
+        from ..view.plots import check_plot
+
+        check_plot(plot)
+    make_room(plot)
+    path = named_fmu(fmu, kind) if engine == "fmu" or kind else fmu
+    begun = perf_counter()
+    with progress_of(chosen.runs, "sweeping", MofNCompleteColumn(), _Rate()) as tell:
+        outcome = sweep(chosen, path, engine=engine, output=output, tell=tell, **options)
+    seconds = perf_counter() - begun
+    OUTPUT.print(f"{outcome.folder}: {outcome.runs} runs, {outcome.new} of them made now in {seconds:.1f} s")
+    if outcome.error:
+        OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}")
+    if outcome.warned:
+        OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
+    _print_extremes(outcome.folder)
+    if plot:
+        from ..sweep.charts import plot_sweep
+
+        OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
+
+
+class _Rate(ProgressColumn):
+    """Runs a second."""
+
+    def render(self, task: Task) -> Text:
+        """Of a sweep on its way."""
+        return Text(f"{task.speed:.3g} runs/s" if task.speed else "")
+
+
+def _print_extremes(folder: Path) -> None:
+    from ..sweep.store import extremes
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("column", "least", "of the run with", "greatest", "of the run with"):
+        table.add_column(title)
+    for each in extremes(folder):
+        cells = [each.column]
+        for value, run in ((each.least, each.least_run), (each.greatest, each.greatest_run)):
+            cells += [f"{value:.4g} {each.unit}", ", ".join(f"{name} = {part:.4g}" for name, part in run.items())]
+        table.add_row(*cells)
+    if table.row_count:
+        OUTPUT.print(table)

@@ -1,0 +1,71 @@
+"""Options and arguments that several commands have, and what is made of them."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .output import OUTPUT
+
+if TYPE_CHECKING:
+    from ..building import Kind
+
+FOLDER = Path("build")
+
+
+class PathOf(click.Path):
+    """A path that is not empty: pathlib takes '' for the current folder."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Raises click.BadParameter."""
+        if value == "":
+            self.fail("'': must be a path", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+def of_an_fmu(command: Callable[..., None]) -> Callable[..., None]:
+    """The argument FMU and the option --fmu of a command that runs one."""
+    kinds = click.Choice(["native", "native3", "python"])
+    option = click.option("--fmu", "kind", type=kinds, help="Instead of a file: the FMU of that kind in build/.")
+    return click.argument("fmu", required=False, type=PathOf(path_type=Path))(option(command))
+
+
+def settings_of(texts: Iterable[str], option: str = "--set") -> dict[str, str]:
+    """Name -> value of texts NAME=VALUE. Raises click.UsageError."""
+    settings: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        name = name.strip()
+        if not (equals and name):
+            raise click.UsageError(f"{option} {text}: must be NAME=VALUE")
+        if name in settings:
+            raise click.UsageError(f"{option} {text}: must be given once, and is {name}={settings[name]} already")
+        settings[name] = value.strip()
+    return settings
+
+
+def named_fmu(fmu: Path | None, kind: "Kind | None") -> Path:
+    """The file that is to be run, and say which it is. Raises as `read_description` does."""
+    from ..building import default_fmu
+    from ..fmu.interface import HOVERCRAFT
+    from ..host import read_description
+
+    if fmu and kind:
+        raise click.UsageError(f"--fmu {kind}: must not be given together with the file {fmu}")
+    path = fmu or default_fmu(kind)
+    read_description(path, model=HOVERCRAFT.name)
+    OUTPUT.print(f"running {path}")
+    return path
+
+
+def make_room(*files: Path | None) -> None:
+    """Make the folders of files that are written after a run: what cannot be is said before it."""
+    for file in filter(None, files):
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            why = f"{error.filename}: {error.strerror}"
+            raise click.ClickException(f"{file}: must be in a folder that can be made; {why}") from error
+        if file.is_dir():
+            raise click.ClickException(f"{file}: is a folder: must be the name of a file")

@@ -1,0 +1,267 @@
+"""The commands that run one craft: simulate, advise, drive."""
+
+import math
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from rich.table import Table
+
+from ..model.craft import PRESETS
+from ..view.operator import PRESET, TIME_SCALE
+from .options import PathOf, make_room, named_fmu, of_an_fmu, settings_of
+from .output import OUTPUT, print_rows, progress_of
+
+if TYPE_CHECKING:
+    from ..building import Kind
+    from ..simulation import Advice, Inputs, Result, Run
+
+
+@click.command("simulate")
+@of_an_fmu
+@click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
+@click.option(
+    "--input", "log", metavar="FILE.csv", type=PathOf(path_type=Path),
+    help="A control log: columns time, thrust, port_thruster, starboard_thruster, wind.x, wind.y (one left out holds "
+    "its start value); linear between rows, two rows at one time are a jump.",
+)  # fmt: skip
+@click.option("--preset", metavar="NAME", help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--start-time", type=float, metavar="S", help="Default: the first time of the inputs.")
+@click.option("--stop-time", type=float, metavar="S", help="Default: the last time of the inputs.")
+@click.option("--communication-step", type=float, metavar="S", help="Default: the scene's, or 0.01 s.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+@click.option(
+    "--output", type=PathOf(path_type=Path), metavar="FILE.csv",
+    help="Write all columns; as --input the file gives the same motion again.",
+)  # fmt: skip
+@click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png", help="Draw the run.")
+@click.option(
+    "--animate", "animation", type=PathOf(path_type=Path), metavar="FILE.gif|FILE.html",
+    help="Draw the run as a moving picture, or as a page to play, zoom and point at.",
+)  # fmt: skip
+@click.option(
+    "--against", metavar="NAME=VALUE,...",
+    help="Animate a second run with these start values beside it: integrator=rk4,step_size=0.1. (--output and --plot "
+    "are of the first.)",
+)  # fmt: skip
+@click.option("--error", is_flag=True, help="Have the FMU tell how far it is off; three times the cost.")
+@click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
+def simulate(
+    fmu: Path | None,
+    kind: "Kind | None",
+    scene: str | None,
+    log: Path | None,
+    settings: tuple[str, ...],
+    output: Path | None,
+    plot: Path | None,
+    animation: Path | None,
+    against: str | None,
+    error: bool,
+    list_scenes: bool,
+    **options: Any,
+) -> None:
+    """Run the FMU over a named scene, or a control log; between communication points, too, inputs go as they are there.
+
+    FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there.
+    """
+    from ..simulation import plan
+
+    if list_scenes:
+        return _print_scenes()
+    if scene and log:
+        raise click.UsageError("--scene and --input: must not be given together")
+    if against is not None and not animation:
+        raise click.UsageError("--against: must be given together with --animate")
+    start_values = settings_of((*settings, "error_estimate=on") if error else settings)
+    inputs: Inputs = log if log else scene or "launch"
+    others = [{**start_values, **settings_of(against.split(","), "--against")}] if against is not None else []
+    if plot:
+        from ..view.plots import check_plot
+
+        check_plot(plot)
+    if animation:
+        from ..view.animation import check_animation
+
+        check_animation(animation)
+    make_room(output, plot, animation)
+    runs = [plan(inputs, start_values=each, **options) for each in (start_values, *others)]
+    if len(runs[0].signals) == 1 and options["stop_time"] is None:
+        duration = runs[0].stop_time - runs[0].start_time
+        OUTPUT.print(f"{runs[0].title} has one row: it holds for the default duration, {duration:g} s (--stop-time)")
+    path = named_fmu(fmu, kind)
+    results = [simulated(run, path) for run in runs]
+    for result in results:
+        print_result(result)
+    write(results[0], output, plot)
+    if animation:
+        _animate(results, animation)
+    return None
+
+
+@click.command("advise")
+@of_an_fmu
+@click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
+@click.option("--input", "log", metavar="FILE.csv", type=PathOf(path_type=Path), help="A control log.")
+@click.option("--within", type=float, metavar="M", default=0.01, show_default=True,
+              help="How far the position may be off, in metres, at every communication point.")  # fmt: skip
+@click.option("--preset", metavar="NAME", help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--communication-step", type=float, metavar="S", help="Default: the scene's, or 0.01 s.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+def advise(
+    fmu: Path | None,
+    kind: "Kind | None",
+    scene: str | None,
+    log: Path | None,
+    settings: tuple[str, ...],
+    **options: Any,
+) -> None:
+    """Say which method and sub-step are the cheapest that keep a scene within a wanted error.
+
+    FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there. Each setting is run with
+    the FMU's own estimate of its error; what is advised is checked with one reference run.
+    """
+    from ..simulation import advise
+
+    if scene and log:
+        raise click.UsageError("--scene and --input: must not be given together")
+    path, inputs = named_fmu(fmu, kind), log or scene or "launch"
+    with progress_of(1.0, "trying settings") as tell:
+        advice = advise(inputs, path, start_values=settings_of(settings), tell=tell, **options)
+    _print_advice(advice)
+    words = ["hovercraft-fmu", "simulate", *([str(path)] if fmu else [])]
+    words += ["--input", str(log)] if log else ["--scene", str(inputs)]
+    for name, value in options.items():
+        words += [f"--{name.replace('_', '-')}", str(value)] if value is not None and name != "within" else []
+    chosen = [*settings, *(f"{name}={value}" for name, value in advice.best.start_values.items())]
+    OUTPUT.print(f"to run it:\n  {shlex.join([*words, *(word for each in chosen for word in ('--set', each))])}")
+    if not advice.is_met:
+        raise click.ClickException(f"no setting stays within {advice.within:g} m; that is the best there is")
+
+
+@click.command("drive")
+@of_an_fmu
+@click.option("--record", metavar="FILE.csv", type=PathOf(path_type=Path), help="Write what you do, to replay it.")
+@click.option("--preset", metavar="NAME", default=PRESET, show_default=True, help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--integrator", metavar="NAME", help="The method of a sub-step; as --set integrator=NAME.")
+@click.option("--step-size", metavar="S", help="The sub-step; as --set step_size=S.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+@click.option("--communication-step", type=float, metavar="S", help="Default: 0.01 s.")
+@click.option(
+    "--time-scale", type=float, default=TIME_SCALE, show_default=True, metavar="N", help="Simulated seconds a second."
+)
+def drive(
+    fmu: Path | None,
+    kind: "Kind | None",
+    record: Path | None,
+    preset: str,
+    integrator: str | None,
+    step_size: str | None,
+    settings: tuple[str, ...],
+    communication_step: float | None,
+    time_scale: float,
+) -> None:
+    """Drive the FMU from the keyboard: the arrow keys, in a window, in real time.
+
+    FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there. H shows the keys. What is
+    recorded replays to the same bits, with the command that is printed at the end.
+    """
+    from ..fmu.interface import INPUTS
+    from ..view.drive import drive, plan_drive
+    from ..view.window import check_display
+
+    short = {"integrator": integrator, "step_size": step_size}
+    start_values = settings_of((*settings, *(f"{name}={value}" for name, value in short.items() if value is not None)))
+    run = plan_drive(preset, start_values, communication_step)
+    check_display()
+    make_room(record)
+    path = named_fmu(fmu, kind)
+
+    def recorded(log: Path) -> None:
+        words = ["hovercraft-fmu", "simulate", str(path), "--input", str(log), "--preset", preset]
+        words += ["--communication-step", repr(run.communication_step)]
+        kept = {name: value for name, value in start_values.items() if name not in INPUTS}  # the log drives the others
+        words += [word for name, value in kept.items() for word in ("--set", f"{name}={value}")]
+        OUTPUT.print(f"recorded {log}; to replay it:\n  {shlex.join(words)}")
+
+    end = drive(run, path, record=record, recorded=recorded, time_scale=time_scale)
+    OUTPUT.print(f"ended at ({end.x:.3f}, {end.y:.3f}) m, heading {math.degrees(end.heading):.2f} deg")
+
+
+def simulated(run: "Run", fmu: Path) -> "Result":
+    """Run it, and tell how far it is."""
+    from ..simulation import run_fmu
+
+    with progress_of(run.stop_time) as progress:
+        return run_fmu(run, fmu, progress)
+
+
+def _print_scenes() -> None:
+    from ..scenes import SCENES
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("scene", "what happens", "craft", "duration", "exact solution"):
+        table.add_column(title)
+    for scene in SCENES.values():
+        exact = "yes" if scene.exact else ""
+        table.add_row(scene.name, scene.description, scene.preset, f"{scene.stop_time:g} s", exact)
+    OUTPUT.print(table)
+
+
+def print_result(result: "Result") -> None:
+    """What came of a run, in a few lines."""
+    run = result.run
+    rows = {
+        "duration": f"{result['time'][-1] - run.start_time:g} s, {len(result['time']) - 1} communication steps",
+        "sub-steps": f"{result['substeps'][-1]}",
+        "distance": f"{result.distance:.2f} m, {result.distance / run.craft.length:.1f} craft lengths",
+        "largest speed": f"{result['speed'].max():.3f} m/s",
+        "headings": f"{math.degrees(result['pose.heading'].min()):.1f} ... "
+        f"{math.degrees(result['pose.heading'].max()):.1f} deg",
+        "end position": f"({result['pose.x'][-1]:.3f}, {result['pose.y'][-1]:.3f}) m",
+        "end heading": f"{math.degrees(result['pose.heading'][-1]):.2f} deg",
+        "end speed": f"{result['speed'][-1]:.4f} m/s",
+    }
+    if result.is_estimated:
+        rows["error, as told"] = result.error_in_words
+    print_rows(f"{run.title}: {run.method}", rows)
+    for warning in result.warnings:
+        OUTPUT.print(f"warning: {warning}")
+
+
+def _print_advice(advice: "Advice") -> None:
+    from ..simulation import metres
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "setting", "sub-steps", "loads", "time", "off, as told", "off a reference run"):
+        table.add_column(title)
+    for what, tried in (("best", advice.best), ("runner-up", advice.runner_up)):
+        if tried:
+            table.add_row(what, tried.words, f"{tried.substeps}", f"{tried.loads}", f"{1e3 * tried.seconds:.3g} ms",
+                          metres(tried.told), metres(tried.true))  # fmt: skip
+    run = advice.run
+    OUTPUT.print(f"{run.title}, {run.stop_time - run.start_time:g} s: at most {metres(advice.within)} off")
+    OUTPUT.print(table)
+    OUTPUT.print(
+        f"a host that holds the inputs over communication steps of {run.communication_step:g} s is "
+        f"{metres(advice.held)} off, whatever the method"
+    )
+
+
+def write(result: "Result", output: Path | None, plot: Path | None) -> None:
+    """Write the files that were asked for."""
+    if output:
+        OUTPUT.print(f"wrote {result.write_csv(output)}")
+    if plot:
+        from ..view.plots import plot_run
+
+        OUTPUT.print(f"wrote {plot_run(result, plot)}")
+
+
+def _animate(results: "Sequence[Result]", animation: Path) -> None:
+    from ..view.animation import animate
+
+    with progress_of(1.0, "drawing") as tell:
+        path = animate(results, animation, tell)
+    OUTPUT.print(f"wrote {path}: {path.stat().st_size / 1000:.0f} kB")
