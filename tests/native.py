@@ -24,7 +24,7 @@ import pytest
 from hovercraft_fmu import elsewhere
 from hovercraft_fmu.elsewhere import compiler
 from hovercraft_fmu.fmu.description import NATIVE, Flavour
-from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, headers, sources
+from hovercraft_fmu.fmu.machine_code import OPTIONS, c_file, c_folders, headers, sources
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.error_estimate import Companion
@@ -33,7 +33,8 @@ from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import SCENES
 
 C_TESTS = Path(__file__).parent / "c"
-KERNEL_FILES = tuple(C_FOLDER / f"{name}.c" for name in ("kernel", "trig", "logarithm"))
+C_FOLDERS = tuple(f"-I{folder}" for folder in c_folders())
+KERNEL_FILES = tuple(c_file(f"{name}.c") for name in ("kernel", "trig", "logarithm"))
 C_INCLUDES = ("-I", str(Path(elsewhere.__file__).parent))
 """Of the calls of both standards."""
 OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
@@ -67,7 +68,7 @@ def written_sources(folder: Path, flavour: Flavour = NATIVE) -> Path:
 
 def compile_c(output: Path, files: Iterable[Path | str], *options: str) -> Path:
     """Compile with this machine's compiler and the options of the FMU, warnings as errors."""
-    command = [c_compiler(), *OPTIONS, "-Wall", "-Wextra", "-Werror", "-I", str(C_FOLDER), "-o", str(output)]
+    command = [c_compiler(), *OPTIONS, "-Wall", "-Wextra", "-Werror", *C_FOLDERS, "-o", str(output)]
     done = subprocess.run([*command, *map(str, files), *options], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return output

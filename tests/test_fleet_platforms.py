@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from hovercraft_fmu.fmu.machine_code import C_FOLDER, LIBRARY_OPTIONS, OPTIONS, PLATFORMS, caches, compiler
+from hovercraft_fmu.fmu.machine_code import C_FOLDER, LIBRARY_OPTIONS, OPTIONS, PLATFORMS, c_file, caches, compiler
 from tests import fuzz
-from tests.native import C_TESTS, c_compiler
+from tests.native import C_FOLDERS, C_TESTS, c_compiler
 from tests.test_native_platforms import ARM_LIBRARIES, WINE
 
 pytestmark = pytest.mark.once
-FOLDERS = ("-I", str(C_FOLDER), "-I", str(C_FOLDER / "fleet"), "-Wno-psabi")
+FOLDERS = (*C_FOLDERS, "-I", str(C_FOLDER / "fleet"), "-Wno-psabi")
 LINUX = ("-DBARE", "-nostdlib", "-Wl,--entry=start", "-lc")
-WINDOWS = ("-nostdlib", "-Wl,--entry=start", "-DHOVERCRAFT_NO_LIBC", "-lkernel32", str(C_FOLDER / "memory.c"))
+WINDOWS = ("-nostdlib", "-Wl,--entry=start", "-DHOVERCRAFT_NO_LIBC", "-lkernel32", str(c_file("memory.c")))
 VECTORS = [option for option in LIBRARY_OPTIONS if "vectorize" in option]
 
 

@@ -72,7 +72,11 @@ def test_with_another_constant_in_the_model_it_is_another_python_fmu(fmu: Path, 
 @pytest.mark.parametrize("flavour", [NATIVE, NATIVE3], ids=lambda flavour: flavour.identifier)
 def test_with_another_constant_in_the_kernel_it_is_another_native_fmu(flavour: Flavour, copied: Copied) -> None:
     before = identity(flavour)
-    change(copied(machine_code, "C_FOLDER") / "kernel.c", "0.5 * craft->air_density", "0.25 * craft->air_density")
+    change(
+        copied(machine_code, "C_FOLDER") / "hovercraft" / "kernel.c",
+        "0.5 * craft->air_density",
+        "0.25 * craft->air_density",
+    )
     assert identity(flavour) != before
 
 

@@ -42,7 +42,7 @@ def test_changed_c_is_never_run_as_old_machine_code(tmp_path: Path, monkeypatch:
         pytest.skip(reason)
     old = library(NATIVE).path("x86_64-linux")
     assert old.exists()
-    with (changed / "kernel.c").open("a") as file:
+    with (changed / "hovercraft" / "kernel.c").open("a") as file:
         file.write("/* changed */\n")
     with pytest.raises(NotCompiledError, match=r"the C was changed since.*pip install -e"):
         library(NATIVE).path("x86_64-linux")
@@ -50,7 +50,7 @@ def test_changed_c_is_never_run_as_old_machine_code(tmp_path: Path, monkeypatch:
     last = library(NATIVE).path("x86_64-linux")
     assert last.exists()
     assert not old.exists()
-    (changed / "kernel.c").write_text("#error on purpose\n")
+    (changed / "hovercraft" / "kernel.c").write_text("#error on purpose\n")
     assert "on purpose" in compile_all()
     with pytest.raises(NotCompiledError, match=r"compiling .* for x86_64-linux-gnu\.2\.17 failed: .*on purpose"):
         library(NATIVE).path("x86_64-linux")

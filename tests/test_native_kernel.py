@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hovercraft_fmu.fmu.machine_code import C_FOLDER
+from hovercraft_fmu.fmu.machine_code import c_file
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, load_function, loads, saturate
 from hovercraft_fmu.model.error_estimate import Companion, accompany, estimated_error
@@ -20,7 +20,7 @@ from hovercraft_fmu.simulation import held_steps, plan
 from tests.native import C_TESTS, SCENES_AND_METHODS, STEPS, Kernel, Text, compile_c
 from tests.strategies import calm_crafts, controls, crafts, numbers, states
 
-KERNEL, TRIG, LOGARITHM = (C_FOLDER / f"{name}.c" for name in ("kernel", "trig", "logarithm"))
+KERNEL, TRIG, LOGARITHM = (c_file(f"{name}.c") for name in ("kernel", "trig", "logarithm"))
 SHARED = ("-shared", "-fPIC", "-lm")
 METHODS = {method.name: method for method in INTEGRATORS}
 
@@ -44,7 +44,7 @@ def shipped(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
 
 @pytest.fixture(scope="module")
 def text(tmp_path_factory: pytest.TempPathFactory) -> Text:
-    files = [C_FOLDER / "text.c", C_TESTS / "text_of.c"]
+    files = [c_file("text.c"), C_TESTS / "text_of.c"]
     return Text(compile_c(tmp_path_factory.mktemp("text") / "text.so", files, "-shared", "-fPIC"))
 
 

@@ -26,7 +26,7 @@ from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.fmu.variable import Variable
 from tests.lowlevel import get, one, start
-from tests.native import C_INCLUDES, C_TESTS, c_compiler, written_sources
+from tests.native import C_FOLDERS, C_INCLUDES, C_TESTS, c_compiler, written_sources
 from tests.test_native_binaries import functions
 
 pytestmark = pytest.mark.once
@@ -242,7 +242,7 @@ def roots(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
     folder = tmp_path_factory.mktemp("root")
     made: list[Any] = []
     for option in ("", "-DHOVERCRAFT_ROOT_IN_C"):
-        command = [c_compiler(), "-O1", *filter(None, [option]), "-I", str(C_FOLDER), str(C_TESTS / "root_of.c")]
+        command = [c_compiler(), "-O1", *filter(None, [option]), *C_FOLDERS, str(C_TESTS / "root_of.c")]
         run([*command, "-shared", "-fPIC", "-o", f"root{len(made)}.so"], folder)
         function = CDLL(str(folder / f"root{len(made)}.so")).root_of
         function.restype, function.argtypes = c_double, (c_double,)

@@ -13,7 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hovercraft_fmu.fmu.interface import STATES
-from hovercraft_fmu.fmu.machine_code import C_FOLDER
+from hovercraft_fmu.fmu.machine_code import c_file
 from hovercraft_fmu.model.subcycling import meant_step, rounding, substeps
 from hovercraft_fmu.scenes import Signals, signals
 from hovercraft_fmu.simulation import Result, plan, run_fmu, run_model
@@ -29,7 +29,7 @@ Host: TypeAlias = Callable[[float, float, int], float]
 def kernel(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
     """In C."""
     made = tmp_path_factory.mktemp("same_time") / "kernel.so"
-    return Kernel(compile_c(made, [C_FOLDER / "kernel.c"], "-DHOVERCRAFT_LIBM", "-shared", "-fPIC", "-lm"))
+    return Kernel(compile_c(made, [c_file("kernel.c")], "-DHOVERCRAFT_LIBM", "-shared", "-fPIC", "-lm"))
 
 
 def _product(start: float, step: float, n: int) -> float:

@@ -26,6 +26,8 @@ COMPILER = ("ziglang", "0.17.1")
 LEAVE_OUT = "HOVERCRAFT_FMU_NO_COMPILER"
 """The environment variable that keeps the build hook from asking for the compiler."""
 C_FOLDER = Path(__file__).parent / "native"
+ROOM, ARITHMETIC = "room", "arithmetic"
+"""Folders there: what every native FMU needs, and functions that models share. Each model has one of its own."""
 COMPILED = Path(__file__).parent / "compiled"
 WHY_NOT = "why_not.txt"
 """In COMPILED: why the last attempt failed, for those who did not see it."""
@@ -170,21 +172,34 @@ UNIT = """\
 
 def fleet_library() -> Library:
     """Of many craft at once: host/fleet.py loads it."""
-    kernel = [C_FOLDER / f"{name}.{suffix}" for name in ("kernel", "logarithm", "memory", "trig") for suffix in "ch"]
-    kernel += [C_FOLDER / f"{name}.h" for name in ("environment", "hidden", "root")]
+    names = [f"{name}.{suffix}" for name in ("kernel", "logarithm", "memory", "trig") for suffix in "ch"]
+    names += [f"{name}.h" for name in ("environment", "hidden", "root")]
+    kernel = [c_file(name) for name in names]
     files = {f"fleet/{file.name}": file.read_bytes() for file in (*kernel, *sorted((C_FOLDER / "fleet").iterdir()))}
     return Library("HovercraftFleet", ("fleet/fleet.c", "fleet/memory.c"), files)
 
 
 def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
     """The C of an FMU, by name, without the standard's headers; `build` is a hexadecimal digest of 32 digits."""
-    files = [C_FOLDER / name for name in flavour.parts] + sorted(C_FOLDER.glob("*.h"))
+    files = [c_file(name) for name in flavour.parts]
+    files += [file for folder in c_folders() for file in sorted(folder.glob("*.h"))]
     unit = UNIT.format(fmi=flavour.fmi, identifier=flavour.identifier, includes=_includes(flavour.parts))
     return {
         **{file.name: file.read_bytes() for file in files},
         "variables.h": variables_header(block_of(flavour, build)).encode(),
         flavour.unit: unit.encode(),
     }
+
+
+def c_folders() -> list[Path]:
+    """Where the C of the hovercraft's FMUs is."""
+    return [C_FOLDER / name for name in (ROOM, ARITHMETIC, "hovercraft")]
+
+
+def c_file(name: str) -> Path:
+    """A file of C, wherever it is: each name is there once."""
+    (path,) = (folder / name for folder in c_folders() if (folder / name).exists())
+    return path
 
 
 def headers(flavour: Flavour) -> dict[str, bytes]:

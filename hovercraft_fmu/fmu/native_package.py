@@ -11,7 +11,7 @@ from .document import documents, licenses
 from .extras import build_description, reference_result, terminals_and_icons
 from .icon import icon_png
 from .mach_o import universal
-from .machine_code import C_FOLDER, OPTIONS, PLATFORMS, block_of, identity, library, sources
+from .machine_code import OPTIONS, PLATFORMS, block_of, c_file, identity, library, sources
 
 FMI_2_FOLDERS = {"x86_64-linux": "linux64", "x86_64-windows": "win64", "x86_64-darwin": "darwin64"}
 
@@ -59,7 +59,7 @@ def _archive(flavour: Flavour, platforms: Iterable[str]) -> bytes:
 
 def _sun_notice() -> bytes:
     """The notice of sine, cosine and logarithm, which their sources carry."""
-    text = (C_FOLDER / "trig.h").read_text(encoding="utf-8")
+    text = c_file("trig.h").read_text(encoding="utf-8")
     lines = text[text.index("   ====") : text.index("   The reduction of medium")].splitlines()
     return "".join(line.removeprefix("   ") + "\n" for line in lines).encode()
 
