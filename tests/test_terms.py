@@ -33,7 +33,6 @@ from hovercraft_fmu.studies import scene_terms
 from hovercraft_fmu.studies.reference_end import reference_end
 from hovercraft_fmu.studies.scene_terms import TERMS
 from hovercraft_fmu.studies.work_precision import Setting, largest, reached
-from tests.conftest import ROOT
 from tests.strategies import calm_controls, calm_crafts, controls, numbers, states
 from tests.test_trade import RESULTS, records
 
@@ -371,7 +370,3 @@ def test_the_study_finds_what_is_committed(tmp_path: Path, monkeypatch: pytest.M
             assert float(row[column]) == pytest.approx(before, rel=1e-6, abs=1e-9)
     assert (tmp_path / "scene_terms.png").stat().st_size > 10000
     assert (tmp_path / "scene_terms.md").read_text(encoding="utf-8").startswith("| term ")
-
-
-def test_the_readme_shows_the_committed_prices() -> None:
-    assert (RESULTS / "scene_terms.md").read_text(encoding="utf-8") in (ROOT / "README.md").read_text(encoding="utf-8")

@@ -216,9 +216,8 @@ def test_a_table_is_markdown_with_three_digits() -> None:
     assert set("".join(lines[1])) == {"-"}
 
 
-@pytest.mark.parametrize("name", ["advice.md", "holding.md", "native.md"])
-def test_the_readme_shows_what_is_committed(name: str) -> None:
-    assert (RESULTS / name).read_text(encoding="utf-8") in (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_readme_shows_what_is_committed() -> None:
+    assert (RESULTS / "advice.md").read_text(encoding="utf-8") in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("scene", model_exchange.SMOOTH, ids=lambda scene: scene.name)

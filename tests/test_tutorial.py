@@ -20,6 +20,7 @@ BLOCKS = [html.unescape(text) for text in re.findall(r'<pre class="python">\n(.*
 PRINTED = (
     r"end: \(.*\) m",
     r"200 kg: .* in a minute",
+    r"^\d\.\d+ m at most; 0 were refused",
     r"arrived: True",
     r"after 500 s: .* off the leg",
     r"after 120 s",
