@@ -4,12 +4,15 @@ from ..fmu.start_values import Value, start_value
 from .advice import WITHIN, Advice, Tried, advise
 from .bare_run import run_model
 from .control_log import read_inputs
+from .cost import ROOT, SINE, counted
 from .fmu_run import Stepper, run_fmu, simulate, stepping
 from .planning import Inputs, Progress, Run, check_effect, check_steps, method_in_words, plan
 from .points import Piece, ends, held_steps, holding, is_ramped, schedule
 from .result import Result, metres, path_length, write_csv
 
 __all__ = [
+    "ROOT",
+    "SINE",
     "WITHIN",
     "Advice",
     "Inputs",
@@ -23,6 +26,7 @@ __all__ = [
     "advise",
     "check_effect",
     "check_steps",
+    "counted",
     "ends",
     "held_steps",
     "holding",

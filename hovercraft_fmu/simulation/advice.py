@@ -14,6 +14,7 @@ from ..fmu.start_values import Value
 from ..fmu.start_values import start_values as numbers
 from ..host import SimulationError
 from ..model.integrators import INTEGRATORS, Integrator
+from .cost import counted
 from .fmu_run import run_fmu, stepping
 from .planning import Inputs, Run, method_in_words, plan
 from .points import ends, holding, schedule
@@ -46,7 +47,7 @@ class Tried:
     """That give it: the integrator, and its step_size [s] or tolerance."""
     substeps: int
     loads: int
-    """How many times they are worked out, all in all."""
+    """What that costs: how many times they are worked out, all in all; see `counted`."""
     told: float
     """m: the largest estimate of a communication point; infinite where it cannot be trusted, or the run was refused."""
     seconds: float = math.nan
@@ -93,7 +94,8 @@ def advise(
 ) -> Advice:
     """Try methods and sub-steps on a scene, or on inputs of your own, and say which is the cheapest.
 
-    Costs are counted: how many times the loads are worked out. A setting that the FMU warns of is none.
+    Costs are counted, as in `measure trade`: how many times the loads are worked out. A setting that the FMU warns of
+    is none.
 
     Args:
         scene_or_inputs, fmu, preset, start_values, communication_step: see `simulate`.
@@ -195,7 +197,7 @@ def _tried(settings: Mapping[str, Value], method: Integrator, result: Result) ->
     substeps = int(result["substeps"][-1])
     trusted = not result["warnings"][-1] & (STEP_UNSTABLE | STEP_TURNS | ERROR_LOST)
     told = float(result["error.position"].max()) if trusted else math.inf
-    return Tried(settings, substeps, substeps * method.stages, told)
+    return Tried(settings, substeps, round(counted(method, substeps)), told)
 
 
 def _apart(result: Result, reference: Result) -> float:

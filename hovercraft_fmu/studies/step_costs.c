@@ -5,6 +5,7 @@
 #include <stddef.h>
 
 #include "fmi2FunctionTypes.h"
+#include "trig.c"
 
 /* n sub-steps of semi-implicit Euler with drag of constant area, from and to x, y, heading, vx, vy, yaw rate.
    k [kg/m], x_d [m], forces [N] and moment [N.m] of the actuators. */
@@ -27,14 +28,34 @@ void plain_loop(double mass, double inertia, double k, double x_d, double thrust
     state[0] = x, state[1] = y, state[2] = heading, state[3] = vx, state[4] = vy, state[5] = r;
 }
 
-/* n communication steps: set the inputs, step, get the outputs. What it returns, and the next: the largest status. */
+/* n sines with their cosines, each of an angle [rad] that waits for the ones before, as in a sub-step. */
+double sine_loop(double angle, int n)
+{
+    struct trig_turn turn = {.quarters = 0.0};
+    for (int i = 0; i < n; i++) {
+        const struct trig_pair pair = trig_sine_cosine(angle, &turn);
+        angle = pair.sine + pair.cosine;
+    }
+    return angle;
+}
+
+/* n square roots, each of a number that waits for the one before. */
+double root_loop(double number, int n)
+{
+    for (int i = 0; i < n; i++)
+        number = sqrt(number) + 1.0;
+    return number;
+}
+
+/* n communication steps: set the inputs, step, get the outputs. `controls` has a row for each, `steps` its start and
+   its size [s]. What it returns, and the next: the largest status. */
 int step_loop(fmi2SetRealTYPE *set, fmi2DoStepTYPE *step, fmi2GetRealTYPE *get, fmi2Component craft,
               const unsigned *inputs, size_t input_count, const double *controls, const unsigned *outputs,
-              size_t output_count, double *values, double size, int n)
+              size_t output_count, double *values, const double *steps, int n)
 {
     int worst = fmi2OK;
-    for (int i = 0; i < n; i++) {
-        const int status[] = {set(craft, inputs, input_count, controls), step(craft, i * size, size, fmi2True),
+    for (int i = 0; i < n; i++, steps += 2, controls += input_count) {
+        const int status[] = {set(craft, inputs, input_count, controls), step(craft, steps[0], steps[1], fmi2True),
                               get(craft, outputs, output_count, values)};
         for (int k = 0; k < 3; k++)
             worst = status[k] > worst ? status[k] : worst;

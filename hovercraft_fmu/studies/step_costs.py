@@ -3,7 +3,7 @@
 import ctypes
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from ctypes import c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import partial
 from pathlib import Path
@@ -39,6 +39,10 @@ DRIVEN = INPUTS[:3]
 SOURCE = Path(__file__).parent / "step_costs.c"
 OPTIONS = ("-std=gnu11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC")
 OURS, PYTHON, BARE, PLAIN = "native FMU", "Python FMU", "bare model, in Python", "plain C loop with libm, -O3"
+Points: TypeAlias = Sequence[tuple[float, float, Controls]]
+"""(start, end) [s] of every communication step, and the controls that hold in it."""
+SHARES = {"a sine with its cosine": ("sine_loop", 0.3), "a square root": ("root_loop", 1.3)}
+"""Parts of a sub-step, the loop that makes them, and where it starts; the weights in simulation/cost.py are these."""
 Cases: TypeAlias = Iterator[tuple[tuple[str, str], Ready[int]]]
 """(what, whose) -> what returns how many of it were made."""
 
@@ -69,6 +73,30 @@ class Loops:
         values = (c_double * 6)(*state)
         self._library.plain_loop(*map(c_double, constants), c_int(n), values)
         return State(*values)
+
+    def chain(self, loop: str, start: float, n: int) -> float:
+        """n operations of one kind, each of which waits for the one before."""
+        function = getattr(self._library, loop)
+        function.restype = c_double
+        end: float = function(c_double(start), c_int(n))
+        return end
+
+    def steps(self, instance: Instance, points: Points) -> Callable[[], int]:
+        """Communication steps that a host in C makes: inputs set, a step, outputs read."""
+        known = {variable.name: variable.valueReference for variable in instance.description.modelVariables}
+        driven, read = ((c_uint * len(names))(*(known[each] for each in names)) for names in (DRIVEN, OUTPUTS))
+        times = (c_double * (2 * len(points)))(*(value for start, end, _ in points for value in (start, end - start)))
+        given = (c_double * (len(DRIVEN) * len(points)))(
+            *(value for point in points for value in point[2][: len(DRIVEN)])
+        )
+        values, sizes = (c_double * len(OUTPUTS))(), (c_size_t(len(DRIVEN)), c_size_t(len(OUTPUTS)))
+
+        def go() -> int:
+            self.on(instance, "step_loop", ("SetReal", "DoStep", "GetReal"), driven, sizes[0], given, read, sizes[1],
+                    values, times, c_int(len(points)))  # fmt: skip
+            return len(points)
+
+        return go
 
     def on(self, instance: Instance, loop: str, functions: tuple[str, ...], *arguments: Any) -> None:
         """Have a loop call functions of an instance's library."""
@@ -118,9 +146,6 @@ def substep_cases(native: Instance, loops: Loops | None) -> Cases:
 def call_cases(name: str, instance: Instance, loops: Loops | None) -> Cases:
     """Communication steps called by Python and, where there are loops, by C."""
     inputs, outputs = instance.port(*DRIVEN), instance.port(*OUTPUTS)
-    known = {variable.name: variable.valueReference for variable in instance.description.modelVariables}
-    driven, read = ((c_uint * len(names))(*(known[each] for each in names)) for names in (DRIVEN, OUTPUTS))
-    given, values = (c_double * len(DRIVEN))(*CONTROLS[:3]), (c_double * len(OUTPUTS))()
 
     def by_python(step: float, n: int) -> int:
         for k in range(n):
@@ -129,16 +154,23 @@ def call_cases(name: str, instance: Instance, loops: Loops | None) -> Cases:
             outputs.get()
         return n
 
-    def by_c(loops: Loops, step: float, n: int) -> int:
-        loops.on(instance, "step_loop", ("SetReal", "DoStep", "GetReal"), driven, c_size_t(len(driven)), given, read,
-                 c_size_t(len(read)), values, c_double(step), n)  # fmt: skip
-        return n
-
     for step, n in COMMUNICATION_STEPS.items():
         what = f"set, doStep of {step:g} s, get"
         yield (f"fmpy: {what}", name), _started(instance, partial(by_python, step, n), {})
         if loops:
-            yield (f"C host: {what}", name), _started(instance, partial(by_c, loops, step, n), {})
+            points = [(k * step, (k + 1) * step, CONTROLS) for k in range(n)]
+            yield (f"C host: {what}", name), _started(instance, loops.steps(instance, points), {})
+
+
+def share_cases(loops: Loops) -> Cases:
+    """What a sub-step is made of, operation by operation."""
+    for what, (loop, start) in SHARES.items():
+        yield (what, OURS), partial(partial, _chained, loops, loop, start)
+
+
+def _chained(loops: Loops, loop: str, start: float) -> int:
+    loops.chain(loop, start, SUBSTEPS)
+    return SUBSTEPS
 
 
 def evaluation_case(solving: Instance, loops: Loops) -> Cases:
@@ -180,7 +212,7 @@ def measure(quick: bool, tell: Tell) -> Findings:
             cases = [*substep_cases(one, loops), *call_cases(OURS, one, loops), *call_cases(PYTHON, other, loops)]
             for whose, path in zip((OURS, PYTHON), paths, strict=True):
                 cases.append((("fmpy: extract, load, instantiate, free", whose), partial(partial, load_and_free, path)))
-            cases += evaluation_case(solving, loops) if loops else []
+            cases += [*evaluation_case(solving, loops), *share_cases(loops)] if loops else []
             timed = interleaved(dict(cases), 5 if quick else ROUNDS, tell)
     found = compared(timed)
     notes.append(spread(timed.values()))
@@ -194,6 +226,8 @@ def compared(timed: Mapping[tuple[str, str], Timed[int]]) -> pl.DataFrame:
         own, factor, label = timed[what, OURS], 1.0, whose
         if what.endswith("derivatives"):
             other, factor, label = timed["rk4: a sub-step", OURS], 0.25, "a quarter of a sub-step of rk4"
+        elif what in SHARES:
+            other, label = timed[f"{INTEGRATORS[0].name}: a sub-step", OURS], f"a sub-step of {INTEGRATORS[0].name}"
         elif whose == OURS:
             continue
         unit, scale = ("us", 1e6) if "doStep" in what or "load" in what else ("ns", 1e9)
