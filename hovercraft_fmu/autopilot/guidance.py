@@ -26,6 +26,9 @@ M = 0.5*20 m*3 N = 30 N.m):
 - U = 0.3 m/s is 7/10 of the top speed: what is left is for the wind.
 
 Half or twice the mass moves that crossing to 0.11 or 0.06 rad/s, and leaves 103 or 92 degrees.
+
+The native autopilot is the same functions in C, in the same order of operations, equal to the bit with libm. So the law
+is made of + - * /, sqrt, sin, cos and atan2 alone (Python's hypot is none of libm's), and of `round` to the nearest.
 """
 
 import math
@@ -38,6 +41,7 @@ from ..model.dynamics import State
 AHEAD = 0.2
 """Of the largest thrust: the least force ahead that the heading is chosen for, so that it does not turn round to
 brake."""
+TURN = 2.0 * math.pi
 UNITS_OF_GAINS = {
     "acceptance_radius": "m",
     "cruise_speed": "m/s",
@@ -138,7 +142,7 @@ def steer(
     active = course[pilot.reached]
     cross_track, wanted = line_of_sight(pilot.origin, active, motion, gains)
     force_x, force_y = wanted_force(pilot, motion, wanted, gains)
-    share = -math.expm1(-duration / gains.integral_time)  # of a lag, over the whole time: stable however long it is
+    share = lag(duration / gains.integral_time)
     pilot = pilot._replace(
         push_x=pilot.push_x + share * (force_x - pilot.push_x), push_y=pilot.push_y + share * (force_y - pilot.push_y)
     )
@@ -167,7 +171,7 @@ def wanted_force(pilot: Pilot, motion: State, wanted: Waypoint, gains: Gains) ->
     """N, world frame: proportional and integral, cut to the largest thrust."""
     force_x = gains.velocity_gain * (gains.cruise_speed * wanted.x - motion.vx) + pilot.push_x
     force_y = gains.velocity_gain * (gains.cruise_speed * wanted.y - motion.vy) + pilot.push_y
-    size = math.hypot(force_x, force_y)
+    size = length_of(force_x, force_y)
     share = gains.thrust_max / size if size > gains.thrust_max else 1.0
     return share * force_x, share * force_y
 
@@ -179,23 +183,41 @@ def helm(force: tuple[float, float], wanted: Waypoint, motion: State, gains: Gai
     aside = force_y * wanted.x - force_x * wanted.y
     # which way round is decided by the direction to go alone: while the craft turns, the side force of the bow
     # thruster swings the force that is wanted, and with it the shorter way would swing to and fro
-    turn = math.remainder(math.atan2(wanted.y, wanted.x) - motion.heading, 2.0 * math.pi)
+    turn = within_half_a_turn(math.atan2(wanted.y, wanted.x) - motion.heading)
     error = turn + math.atan2(aside, ahead)
     steering = _held(gains.heading_gain * error - gains.yaw_rate_gain * motion.yaw_rate, -1.0, 1.0)
     thrust = force_x * math.cos(motion.heading) + force_y * math.sin(motion.heading)
     return Commands(_held(thrust, 0.0, gains.thrust_max), max(steering, 0.0), max(-steering, 0.0))
 
 
+def lag(z: float) -> float:
+    """The share of the way that a lag goes in z time constants: 1 - exp(-z), by the Pade approximation (0,2) of the
+    exponential; from 0 to 1 however long it is.
+    """
+    grown = z * (1.0 + 0.5 * z)
+    return grown / (1.0 + grown) if grown < math.inf else 1.0
+
+
+def length_of(x: float, y: float) -> float:
+    """Of a vector; infinite where its square is."""
+    return math.sqrt(x * x + y * y)
+
+
+def within_half_a_turn(angle: float) -> float:
+    """rad: the same direction, from -pi to pi."""
+    return angle - TURN * round(angle / TURN)
+
+
 def _unit(x: float, y: float) -> tuple[float, float, float]:
     """The unit vector, and the length [m]."""
-    length = math.hypot(x, y)
+    length = length_of(x, y)
     if not 0.0 < length < math.inf:
         raise ValueError(f"a leg of {length!r} m: must be a finite length greater than 0; the pose is out of range")
     return x / length, y / length, length
 
 
 def _distance(motion: State, waypoint: Waypoint) -> float:
-    return math.hypot(waypoint.x - motion.x, waypoint.y - motion.y)
+    return length_of(waypoint.x - motion.x, waypoint.y - motion.y)
 
 
 def _held(value: float, low: float, high: float) -> float:
