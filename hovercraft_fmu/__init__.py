@@ -1,11 +1,13 @@
 """A hovercraft as an FMU: build it, run it."""
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from ._version import __version__
 
+TYPE_CHECKING = False  # as typing has it, which takes some time to load: a command is to be stopped from the start on
 if TYPE_CHECKING:
+    from typing import Any
+
     from .building import build
     from .host import SimulationError
     from .host.fleet import Crafts, advance_fleet
@@ -36,7 +38,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -309,10 +309,10 @@ def test_the_command_from_the_keyboard_to_the_replay(fmu: Path, tmp_path: Path) 
         time.sleep(0.1)
     driven.send_signal(signal.SIGINT)
     printed, errors = driven.communicate(timeout=60)
-    assert (driven.returncode, errors) == (0, "")
+    assert (driven.returncode, errors.strip()) == (130, "hovercraft-fmu: stopped")
     line = next(line for line in printed.splitlines() if line.strip().startswith("hovercraft-fmu simulate"))
     replayed = subprocess.run(command(*shlex.split(line)[1:]), capture_output=True, check=True, timeout=60, **options)
-    place = re.search(r"ended at (\(.*\)) m", printed)
+    place = re.search(r"\n# ended .*, at (\(.*\)) m\n$", log.read_text())
     assert place
     assert f"end position   {place[1]} m" in replayed.stdout
 

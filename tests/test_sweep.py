@@ -787,5 +787,5 @@ def test_stopping_is_no_harm(fmu: Path, tmp_path: Path) -> None:
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
-    assert (process.returncode, said.strip()) == (1, "hovercraft-fmu: stopped")
+    assert (process.returncode, said.strip()) == (130, "hovercraft-fmu: stopped")
     assert not list(there.glob(".*"))

@@ -6,7 +6,6 @@ import sys
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Literal, NamedTuple, TypeAlias, get_args
 from xml.etree.ElementTree import ParseError, fromstring
@@ -21,6 +20,7 @@ from ..fmu.machine_code import identity
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu, hovercraft_content, python_identity
 from ..fmu.start_values import Value, variant
+from ..whole import temporary_folder
 from .ssp import build_ssp
 
 Kind: TypeAlias = Literal["native", "native3", "python", "autopilot", "native_loop", "native3_loop", "python_loop"]
@@ -53,7 +53,7 @@ def _loop(flavour: Flavour) -> Product:
 
     def write(path: Path) -> Path:
         check_target(path, ".ssp")
-        with TemporaryDirectory(prefix="hovercraft_fmu_") as folder:
+        with temporary_folder() as folder:
             return build_ssp(path, _craft(flavour)(Path(folder) / fmu), build_autopilot(Path(folder) / pilot))
 
     purpose = f"SSP 1.0: the closed loop of {fmu} and {pilot}, for co-simulation masters"

@@ -7,6 +7,7 @@ import sys
 
 import click
 
+from .. import stopping
 from .._version import __version__
 from . import demos, files, many, running
 from .output import OUTPUT, one_line
@@ -18,11 +19,12 @@ EXPECTED = (ValueError, OSError, ArithmeticError, ModuleNotFoundError)
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command and leave the process: status 0, or 1 after a line for each thing that is wrong."""
+    """Run the command and leave the process: status 0, or 1 after a line for each thing that is wrong; 130 where
+    it was stopped."""
     try:
         status = commands.main(arguments, prog_name="hovercraft-fmu", standalone_mode=False)
     except click.exceptions.Abort:
-        sys.exit("hovercraft-fmu: stopped")
+        stopping.end()
     except click.ClickException as error:
         sys.exit(f"hovercraft-fmu: {error.format_message()}")
     except EXPECTED as error:

@@ -90,6 +90,8 @@ def simulate(
     if len(runs[0].signals) == 1 and options["stop_time"] is None:
         duration = runs[0].stop_time - runs[0].start_time
         OUTPUT.print(f"{runs[0].title} has one row: it holds for the default duration, {duration:g} s (--stop-time)")
+    if runs[0].cut:
+        OUTPUT.print(f"{runs[0].title}: the record was cut, it does not say how it ended: at most a second is missing")
     path = named_fmu(fmu, kind)
     results = [simulated(run, path) for run in runs]
     for result in results:

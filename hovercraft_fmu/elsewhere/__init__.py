@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
 from importlib import metadata
@@ -18,6 +17,7 @@ import fmpy
 
 from ..fmu.interface import BY_NAME, INPUTS, OUTPUTS
 from ..host import Fmu
+from ..whole import temporary_folder
 
 COMMUNICATION_STEP = 0.1
 """s"""
@@ -205,7 +205,7 @@ def run_ecospy(fmu: Path) -> list[list[float]]:
 
 def run_fmucontainer(fmu: Path) -> list[list[float]]:
     """The FMU inside a container FMU, which fmpy drives."""
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         work = Path(folder)
         shutil.copy(fmu, work / "Hovercraft.fmu")
         content = {"name": "Container.fmu", "fmu": ["Hovercraft.fmu"], "step_size": COMMUNICATION_STEP}
@@ -225,7 +225,7 @@ def run_c(fmu: Path) -> list[list[float]]:
     """A host in C, compiled here; for a Python FMU Python's library is preloaded, as a tool that is not Python must."""
     description = fmpy.read_model_description(fmu)
     fmi = int(description.fmiVersion[0])
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         fmpy.extract(fmu, unzipdir=folder)
         platform = "linux64" if fmi == 2 else "x86_64-linux"
         library = Path(folder, "binaries", platform, f"{description.coSimulation.modelIdentifier}.so")

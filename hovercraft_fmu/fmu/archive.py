@@ -1,12 +1,13 @@
 """Archives: written at once or not at all, the same bytes whenever and wherever they are made."""
 
-import errno
 import hashlib
 import io
 import os
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
+
+from ..whole import check_writable, write_whole
 
 
 def write_archive(path: str | os.PathLike[str], make: Callable[[], bytes], suffix: str = ".fmu") -> Path:
@@ -18,13 +19,7 @@ def write_archive(path: str | os.PathLike[str], make: Callable[[], bytes], suffi
     """
     path = Path(path)
     check_target(path, suffix)
-    content = make()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _replace(path, content)
-    except OSError as error:  # it names a file that nobody asked for
-        rule = "must be in a folder that can be written to, with room for it"
-        raise OSError(error.errno, f"{rule} ({error.strerror})", str(path)) from error
+    write_whole(path, make())
     return path
 
 
@@ -32,20 +27,7 @@ def check_target(path: Path, suffix: str) -> None:
     """Raises as `write_archive` does where it can be told beforehand that a file cannot be written."""
     if path.suffix != suffix:
         raise ValueError(f"path = {str(path)!r}: must end in {suffix}")
-    if path.is_dir():
-        raise OSError(errno.EISDIR, "must be a file, and is a folder", str(path))
-    above = next(folder for folder in path.parents if folder.exists())
-    if not above.is_dir():
-        raise OSError(errno.ENOTDIR, f"must be in a folder, and {above} is a file", str(path))
-
-
-def _replace(path: Path, content: bytes) -> None:
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        unfinished.write_bytes(content)
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    check_writable(path)
 
 
 def zipped(files: Mapping[str, bytes]) -> bytes:

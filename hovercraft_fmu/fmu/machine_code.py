@@ -8,7 +8,6 @@ of, so C that was changed since finds no folder, and stale machine code is never
 import os
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from functools import cached_property
 from importlib import metadata, resources
 from pathlib import Path
 
+from ..whole import temporary_folder
 from .archive import digest, write_archive
 from .block import Block, block
 from .description import NATIVE, NATIVE3, PARTS, Flavour, model_description, xml
@@ -281,7 +281,7 @@ def _compile(wanted: Sequence[Library], platforms: Iterable[str]) -> None:
     if not jobs:
         return
     _require_compiler()
-    with tempfile.TemporaryDirectory(prefix="hovercraft_native_") as place, ThreadPoolExecutor(os.cpu_count()) as pool:
+    with temporary_folder() as place, ThreadPoolExecutor(os.cpu_count()) as pool:
         folder = Path(place)
         for name, content in {name: content for each, _ in jobs for name, content in each.files.items()}.items():
             (folder / name).parent.mkdir(exist_ok=True)

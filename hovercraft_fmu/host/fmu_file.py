@@ -1,7 +1,6 @@
 """An FMU file: its description, and what of it an instance needs, extracted."""
 
 import os
-import tempfile
 import zipfile
 from pathlib import Path
 from types import TracebackType
@@ -10,12 +9,16 @@ from typing import Any
 import fmpy
 
 from ..fmu.interface import HOVERCRAFT
+from ..stopping import Interruptible
+from ..whole import check_survived, temporary_folder
 from .instance import Instance, Intermediate
 
 VERSIONS = ("2.0", "3.0")
 """Of FMI, that are driven here."""
 NOT_NEEDED = ("documentation/", "sources/")
 """By an instance: these folders are not extracted."""
+PYTHON_PART = "resources/slavemodule.txt"
+"""Of an FMU that pythonfmu's wrapper runs."""
 
 
 class Fmu:
@@ -31,19 +34,20 @@ class Fmu:
 
     Raises:
         FileNotFoundError: no such file.
-        ValueError: see `read_description`.
+        ValueError: see `read_description`; what is in it cannot be extracted.
+        OSError: nor can it to the temporary folder.
     """
 
     def __init__(self, path: str | os.PathLike[str], model: str | None = None, validate: bool = True) -> None:
         self.path = Path(path)
         self.description = read_description(self.path, validate, model)
         self.is_fmi_3: bool = self.description.fmiVersion == "3.0"
-        self._folder = tempfile.TemporaryDirectory(prefix="hovercraft_fmu_")
+        self._folder, self._interruptible = temporary_folder(), Interruptible()
         self.folder = self._folder.name
         """Where it was extracted to."""
         try:
-            fmpy.extract(self.path, unzipdir=self.folder, include=lambda name: not name.startswith(NOT_NEEDED))
-        except Exception:
+            _extract(self.path, self.folder)
+        except BaseException:
             self.close()
             raise
 
@@ -58,6 +62,7 @@ class Fmu:
 
     def close(self) -> None:
         """Delete what was extracted; its instances must be closed."""
+        self._interruptible.close()
         self._folder.cleanup()
 
     def __enter__(self) -> "Fmu":
@@ -67,6 +72,17 @@ class Fmu:
         self, _type: type[BaseException] | None, _error: BaseException | None, _at: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _extract(path: Path, folder: str) -> None:
+    try:
+        fmpy.extract(path, unzipdir=folder, include=lambda name: not name.startswith(NOT_NEEDED))
+    except OSError:
+        raise
+    except Exception as error:  # fmpy and zipfile raise many kinds
+        raise ValueError(f"{path}: must be an archive that can be extracted; {error}") from error
+    if Path(folder, PYTHON_PART).exists():
+        check_survived(folder)
 
 
 def read_description(path: Path, validate: bool = True, model: str | None = None) -> Any:

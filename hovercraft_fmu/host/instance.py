@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from fmpy import fmi2, fmi3
 from numpy.typing import NDArray
 
+from ..stopping import called_back
 from .messages import CALLBACKS_2, WARNING, Log
 
 FATAL = 4
@@ -115,6 +116,7 @@ class Instance:
         self._instantiate()
         self._prepare(exchange)
 
+    @called_back
     def _update(self, _environment: object, time: float, *_others: object) -> None:
         """Called by the FMU; ctypes would drop what is raised."""
         assert self._intermediate

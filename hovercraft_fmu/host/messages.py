@@ -11,6 +11,8 @@ from weakref import WeakValueDictionary
 import fmpy
 from fmpy import fmi2
 
+from ..stopping import called_back
+
 WARNING = 1
 """Of FMI's status: what is above it was refused."""
 
@@ -48,12 +50,14 @@ LOGS: WeakValueDictionary[bytes, Log] = WeakValueDictionary()
 INSTANCES = itertools.count(1)
 
 
+@called_back
 def _log(_environment: object, name: bytes, status: int, _category: bytes, message: bytes) -> None:
     log = LOGS.get(name)
     if log is not None:
         log.add(status, plain(message.decode(errors="replace")))
 
 
+@called_back
 def _log_3(name: bytes, environment: object, status: int, category: bytes, message: bytes) -> None:
     _log(environment, name, status, category, message)
 

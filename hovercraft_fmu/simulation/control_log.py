@@ -27,6 +27,16 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 NAME = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(]\s*(?P<unit>[^\])]*?)\s*[\])])?")
 """Of a column: `thrust`, `time [s]`, `wind.x (m/s)`."""
+RECORDED = "# recorded by hovercraft-fmu drive; the last line says how it ended"
+ENDED = "# ended "
+
+
+class ControlLog(NamedTuple):
+    """What a file has in it."""
+
+    table: Signals
+    cut: bool
+    """Whether it is the record of a drive whose end is missing."""
 
 
 class Line(NamedTuple):
@@ -51,8 +61,17 @@ def read_inputs(path: str | os.PathLike[str]) -> Signals:
         FileNotFoundError: no such file.
         ValueError: names the file, and the line, column, value and rule.
     """
+    return read_control_log(path).table
+
+
+def read_control_log(path: str | os.PathLike[str]) -> ControlLog:
+    """The same, with what is to be told of it. Raises as `read_inputs` does."""
     source = Path(path)
-    header, *rows = list(_lines(source, _text(source))) or [Line(1, [])]
+    text = _text(source)
+    cut = RECORDED in text and f"\n{ENDED}" not in text
+    if cut:  # its last line may be cut, too
+        text = text[: text.rfind("\n") + 1]
+    header, *rows = list(_lines(source, text)) or [Line(1, [])]
     if not rows:
         raise ValueError(f"{source}: must have a header and at least one row of numbers")
     while not header.cells[-1]:  # a separator at the end of the line
@@ -65,7 +84,7 @@ def read_inputs(path: str | os.PathLike[str]) -> Signals:
     table = np.empty(len(rows), dtype=[(name, np.float64) for name in order])
     for name in order:
         table[name] = columns[name]
-    return table
+    return ControlLog(table, cut)
 
 
 def _text(source: Path) -> str:

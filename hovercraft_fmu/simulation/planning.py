@@ -18,7 +18,7 @@ from ..model.dynamics import State
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..scenes import Scene, Signals, scene, signals
-from .control_log import SHOWN, checked_signals, read_inputs
+from .control_log import SHOWN, ControlLog, checked_signals, read_control_log
 
 Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
 """A scene or its name; a CSV file (a name that ends in .csv); a structured array with `time` and input names."""
@@ -67,6 +67,8 @@ class Run:
     """Start values that the FMU has of its own."""
     held: tuple[str, ...] = ()
     """Inputs that hold their start value: nothing was said of them."""
+    cut: bool = False
+    """Whether the inputs are the record of a drive whose end is missing."""
 
     def on(self, own: Mapping[str, float | int]) -> "Run":
         """The same on an FMU with start values of its own: they hold where the run sets nothing else."""
@@ -127,7 +129,8 @@ def plan(
         ValueError: names the argument, the value and the rule.
     """
     chosen = _scene(scene_or_inputs)
-    table = chosen.signals if chosen else _signals(cast("str | os.PathLike[str] | Signals", scene_or_inputs))
+    log = _log(chosen, scene_or_inputs)
+    table = log.table
     given = numbers(start_values or {})
     title = _title(chosen, scene_or_inputs)
     check_effect(given, table.dtype.names or (), title)
@@ -144,6 +147,7 @@ def plan(
         stop_time=last if stop_time is None else stop_time,
         communication_step=default_step if communication_step is None else communication_step,
         held=tuple(name for name in INPUTS if name not in (table.dtype.names or ()) and name not in values),
+        cut=log.cut,
     )
     _check_times(run)
     return run
@@ -163,10 +167,12 @@ def _title(chosen: Scene | None, scene_or_inputs: Inputs) -> str:
     return "inputs" if isinstance(scene_or_inputs, np.ndarray) else Path(cast(str, scene_or_inputs)).name
 
 
-def _signals(source: str | os.PathLike[str] | Signals) -> Signals:
+def _log(chosen: Scene | None, source: Inputs) -> ControlLog:
+    if chosen:
+        return ControlLog(chosen.signals, False)
     if isinstance(source, np.ndarray):
-        return checked_signals(source, "inputs")
-    return read_inputs(source)
+        return ControlLog(checked_signals(source, "inputs"), False)
+    return read_control_log(cast("str | os.PathLike[str]", source))
 
 
 def _completed(table: Signals, values: Mapping[str, float | int]) -> Signals:

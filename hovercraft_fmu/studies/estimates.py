@@ -5,7 +5,6 @@ against scipy's solver); where its own doubt, the difference from a tenth of tha
 says nothing of it.
 """
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,6 +22,7 @@ from ..scenes import SCENES
 from ..simulation import advise, metres
 from ..view.palette import INK, METHODS
 from ..view.plots import new_figure
+from ..whole import temporary_folder
 from .laboratory import Findings, Shown, Tell
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def shares(found: pl.DataFrame) -> pl.DataFrame:
 def advised(scenes: Sequence[str]) -> pl.DataFrame:
     """What `advise` says of scenes, and how far that is off a reference run [m]."""
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         fmu = build_native_fmu(Path(folder) / "Native.fmu")
         for scene in scenes:
             advice = advise(scene, fmu)

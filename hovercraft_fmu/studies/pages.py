@@ -6,7 +6,6 @@ table, a picture or a template has changed; a test holds what is committed equal
 
 import csv
 import io
-import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -34,6 +33,7 @@ from ..sweep.charts import plot_sweep
 from ..sweep.study import SHIPPED
 from ..view.diagram import draw_diagram
 from ..view.plots import plot_passage, plot_run
+from ..whole import temporary_folder
 from . import closed_loop, scene_terms, work_precision
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def assemble(results: Path = RESULTS) -> list[Path]:
     for name, draw in DRAWN.items():
         (table,) = PICTURES[name]
         files[PACKED / name] = line_art(draw(pl.read_csv(table)), shown(name))
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         _draw(Path(folder))
         for name in PICTURES.keys() - DRAWN.keys():
             picture = next((each / name for each in (Path(folder), results) if (each / name).exists()), None)

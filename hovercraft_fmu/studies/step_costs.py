@@ -2,7 +2,6 @@
 
 import ctypes
 import subprocess
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from ctypes import c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import partial
@@ -23,6 +22,7 @@ from ..model.craft import Craft
 from ..model.dynamics import Controls, State, actuation
 from ..model.integrators import INTEGRATORS
 from ..model.subcycling import Settings, advance
+from ..whole import temporary_folder
 from .laboratory import Findings, Ready, Shown, Tell, Timed, interleaved, spread
 
 STEP_SIZE = 0.001
@@ -198,7 +198,7 @@ def load_and_free(path: Path) -> int:
 def measure(quick: bool, tell: Tell) -> Findings:
     """All cases; quick: a quarter of the rounds. Without a C compiler those called by Python alone."""
     notes, loops = [], None
-    with tempfile.TemporaryDirectory() as place:
+    with temporary_folder() as place:
         folder = Path(place)
         try:
             loops = Loops(folder)

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -22,6 +21,7 @@ from ..fmu.python_package import build_fmu
 from ..simulation import plan
 from ..sweep.runner import BATCH, FMU, sweep
 from ..sweep.study import read_study
+from ..whole import temporary_folder
 from .laboratory import Findings, Shown, Tell, interleaved
 
 FMPY, PYTHON, NATIVE, BARE = "fmpy alone, native FMU", "sweep, Python FMU", "sweep, native FMU", "sweep, batch"
@@ -67,7 +67,7 @@ def measure(quick: bool, tell: Tell) -> Findings:
 
     Raises OSError where a process failed, with what it said.
     """
-    with tempfile.TemporaryDirectory(prefix="hovercraft_sweep_") as place:
+    with temporary_folder() as place:
         python, native = build_fmu(Path(place) / "Python.fmu"), build_native_fmu(Path(place) / "Native.fmu")
         cases = {
             way: partial(partial, in_process, way, native if way.way in (FMPY, NATIVE) else python)
@@ -90,7 +90,7 @@ def measure(quick: bool, tell: Tell) -> Findings:
 
 def in_process(way: Way, fmu: Path) -> list[float]:
     """Seconds with the start of the workers and the writing; the peak [MB] of a process of its own, of a worker."""
-    with tempfile.TemporaryDirectory(prefix="hovercraft_sweep_") as output:
+    with temporary_folder() as output:
         command = module_command(__name__, json.dumps(way), str(fmu), output)
         made = subprocess.run(command, capture_output=True, text=True, check=False)
     if made.returncode != 0:

@@ -1,6 +1,5 @@
 """The trade: what speed costs and what accuracy costs, with the FMU's own methods and with a solver of the host's."""
 
-import tempfile
 from pathlib import Path
 
 from ..fmu.description import NATIVE
@@ -9,6 +8,7 @@ from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..host import Fmu
 from ..scenes import SCENES
+from ..whole import temporary_folder
 from .laboratory import Findings, Tell, part
 from .model_exchange import SMOOTH, exchanged
 from .work_precision import ADVISED_SCENE, ROUNDS, accuracy, advice, measured
@@ -18,7 +18,7 @@ def measure(quick: bool, tell: Tell) -> Findings:
     """Every scene with every setting; quick: the scene that advice is given for, once."""
     scenes, smooth = ([SCENES[ADVISED_SCENE]],) * 2 if quick else (list(SCENES.values()), SMOOTH)
     rounds = 1 if quick else ROUNDS
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         with Fmu(build_fmu(Path(folder) / "Python.fmu")) as fmu, fmu.instance() as instance:
             found = measured(instance, scenes, rounds, part(tell, 0.0, 0.6))
         found.add(advice(found.records["work_precision"]))

@@ -1,10 +1,8 @@
 """Makes runs through the FMU, one instance for all of them."""
 
-import signal
-import tempfile
 import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
@@ -20,6 +18,7 @@ from ..model.dynamics import Controls
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..simulation import Run, is_ramped
+from ..whole import temporary_folder
 from .quantities import Keep, Record, Samples
 from .timeline import Leg, Timeline, merged
 
@@ -66,7 +65,7 @@ class Driver:
     def __init__(self, plan: Plan, fmu: bytes, swept: tuple[str, ...]) -> None:
         self._plan = plan
         self._stack = ExitStack()
-        folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix="hovercraft_sweep_"))
+        folder = self._stack.enter_context(temporary_folder())
         path = Path(folder) / "swept.fmu"
         path.write_bytes(fmu)
         opened = self._stack.enter_context(Fmu(path))
@@ -102,19 +101,16 @@ class Driver:
         count = len(next(iter(samples.values())))
         ran = empty(self._plan, count)
         columns = {name: column.tolist() for name, column in samples.items()}
-        with _interrupted_afterwards() as interrupted:
-            for i in range(count):
-                values = self._shared | {name: column[i] for name, column in columns.items()}
-                try:
-                    self._one(values)
-                    ran.record[i] = self._record
-                    (ran.warnings[i],) = self._warnings.get()
-                except (SimulationError, ValueError) as error:
-                    ran.errors[i] = str(error)
-                self._craft.messages.clear()
-                self._craft.reset()
-                if interrupted:
-                    break
+        for i in range(count):
+            values = self._shared | {name: column[i] for name, column in columns.items()}
+            try:
+                self._one(values)
+                ran.record[i] = self._record
+                (ran.warnings[i],) = self._warnings.get()
+            except (SimulationError, ValueError) as error:
+                ran.errors[i] = str(error)
+            self._craft.messages.clear()
+            self._craft.reset()
         return ran
 
     def _one(self, values: Mapping[str, float | int]) -> None:
@@ -138,22 +134,3 @@ class Driver:
         for i, name in self._driven:
             given[i] = values[name]
         return Controls(*given)
-
-
-@contextmanager
-def _interrupted_afterwards() -> Iterator[list[bool]]:
-    """A Ctrl-C waits for the end of a run: inside a Python FMU it would be the FMU's error, or end the process.
-
-    The list is empty until there was one; at the end it is raised.
-    """
-    seen: list[bool] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield seen
-        return
-    before = signal.signal(signal.SIGINT, lambda *_: seen.append(True))
-    try:
-        yield seen
-    finally:
-        signal.signal(signal.SIGINT, before)
-        if seen:
-            raise KeyboardInterrupt

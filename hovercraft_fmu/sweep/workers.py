@@ -2,15 +2,16 @@
 
 import signal
 import tempfile
-import threading
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeAlias
 
 from ..host import SimulationError
+from ..stopping import held
+from ..whole import temporary_folder
 from .quantities import Samples
 from .work import Job, Made, make_chunk, release
 
@@ -66,12 +67,12 @@ def _processes(count: int) -> Iterator[list[Connection]]:
     """Workers, each at the other end of one of these; they end with the context, or with this process."""
     context = get_context("spawn")
     # a worker that is ended in the middle of a chunk leaves the FMU's files: they go with this folder
-    with tempfile.TemporaryDirectory(prefix="hovercraft_sweep_", ignore_cleanup_errors=True) as folder:
+    with temporary_folder() as folder:
         pairs = [context.Pipe() for _ in range(count)]
         processes = [context.Process(target=_work, args=(there, folder), daemon=True) for _, there in pairs]
         ends = [here for here, _ in pairs]
         try:
-            with _no_interrupts():  # what is ignored when a process starts stays so
+            with held(), _deaf():
                 for process in processes:
                     process.start()
             for _, there in pairs:
@@ -79,26 +80,29 @@ def _processes(count: int) -> Iterator[list[Connection]]:
             yield ends
         except BaseException:
             for process in processes:
-                process.kill()
+                if process.pid:
+                    process.kill()
             raise
         finally:
             for end in ends:
                 end.close()
             for process in processes:
-                process.join()
+                if process.pid:
+                    process.join()
 
 
 @contextmanager
-def _no_interrupts() -> Iterator[None]:
-    """A Ctrl-C is for this process, and not now."""
-    if threading.current_thread() is not threading.main_thread():
+def _deaf() -> Iterator[None]:
+    """Processes that are started here take no Ctrl-C: it is for this one, which ends them."""
+    if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    resource_tracker.ensure_running()  # which would undo it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(end: Connection, folder: str) -> None:

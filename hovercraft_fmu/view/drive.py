@@ -1,6 +1,5 @@
 """Drive the FMU from the keyboard, in real time, and record what the operator did."""
 
-import csv
 import itertools
 import os
 import signal
@@ -9,6 +8,7 @@ from contextlib import closing, contextmanager
 from math import inf
 from pathlib import Path
 from time import perf_counter
+from types import TracebackType
 from typing import Protocol
 
 from ..fmu.interface import INPUTS, STATES
@@ -16,11 +16,15 @@ from ..fmu.start_values import Value
 from ..model.dynamics import Controls, State
 from ..scenes import signals
 from ..simulation import Run, Stepper, check_effect, plan, stepping
+from ..simulation.control_log import ENDED, RECORDED
+from ..stopping import SIGNALS
 from .operator import PRESET, TIME_SCALE, Action, Operator, Pace
 from .window import Frame, Window, pygame
 
 SLOWEST, FASTEST = 0.1, 1000.0
 FRAME_RATE = 60
+FLUSHED_EVERY = 1.0
+"""s: what a drive that is killed loses."""
 LONGEST_LAG = 0.25
 """s: what one frame catches up at most, and computes at most; the rest is dropped, and the drive runs slower."""
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0
@@ -110,35 +114,55 @@ def drive(
         raise ValueError(f"time_scale = {time_scale!r}: must be from {SLOWEST:g} to {FASTEST:g}")
     with (
         stepping(run, fmu) as stepper,
-        closing(Flight(stepper, run, Path(record) if record else None, recorded)) as flight,
+        Flight(stepper, run, Path(record) if record else None, recorded) as flight,
         closing(Window(run.craft, f"hovercraft: {run.method}")) as window,
-        _ended_by_interrupt(),
     ):
-        _Loop(flight, window, time_scale, clock or WallClock()).run()
+        loop = _Loop(flight, window, time_scale, clock or WallClock())
+        with _ended_by_signals(loop):
+            loop.run()
+        if loop.stopped:
+            signal.raise_signal(loop.stopped)
         return flight.state
 
 
 class ControlLog:
-    """A CSV file that grows while one drives: controls that hold, so a change is two rows at its time."""
+    """A CSV file that grows while one drives: controls that hold, so a change is two rows at its time.
+
+    It is written whole lines at a time, once a second, and its last one says how it ended: where that is missing the
+    record was cut.
+    """
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path, self.last = path, -inf
         self._held: Controls | None = None
-        self._file = path.open("w", newline="", encoding="utf-8")
-        self._writer = csv.writer(self._file, lineterminator="\n")
-        self._writer.writerow(("time", *INPUTS))
+        self._file = path.open("wb", buffering=0)
+        self._lines, self._flushed = [",".join(("time", *INPUTS)), RECORDED], -inf
 
     def write(self, time: float, controls: Controls) -> None:
         """The controls from this communication point on, with all digits."""
         if self._held not in (None, controls):
-            self._writer.writerow((time, *self._held))
-        self._writer.writerow((time, *controls))
+            self._add(time, self._held)
+        self._add(time, controls)
         self.last, self._held = time, controls
+        if perf_counter() - self._flushed > FLUSHED_EVERY:
+            self._flush()
 
-    def close(self) -> None:
-        """All is on the disk."""
-        self._file.close()
+    def _add(self, time: float, controls: Controls | None) -> None:
+        self._lines.append(",".join(map(repr, (time, *(controls or ())))))
+
+    def _flush(self) -> None:
+        """Raises OSError."""
+        content = "".join(f"{line}\n" for line in self._lines).encode()
+        while content:
+            content = content[self._file.write(content) :]
+        self._lines, self._flushed = [], perf_counter()
+
+    def close(self, how: str) -> None:
+        """All is on the disk. Raises OSError where that cannot be done."""
+        with closing(self._file):
+            self._lines.append(f"{ENDED}{how}")
+            self._flush()
 
 
 class Flight:
@@ -201,20 +225,29 @@ class Flight:
 
     def reset(self) -> None:
         """Back to the start. What was recorded stays; what comes is recorded beside it."""
-        self.close()
+        self.close("by a reset")
         held = self.operator.held
         self.operator = self._new_operator()
         self.operator.held = held
         self._stepper.restart(self.operator.controls)
 
-    def close(self) -> None:
+    def __enter__(self) -> "Flight":
+        return self
+
+    def __exit__(
+        self, _type: type[BaseException] | None, error: BaseException | None, _at: TracebackType | None
+    ) -> None:
+        self.close(" ".join(f"{type(error).__name__}: {error}".split()) if error else "by the operator")
+
+    def close(self, how: str) -> None:
         """The last communication point ends the log: a row without a step."""
         log, self._log = self._log, None
         if log is None:
             return
-        with closing(log):
-            if log.last < self.time:  # a step that was refused has its row, at this very time
-                log.write(self.time, self.operator.controls)
+        if log.last < self.time:  # a step that was refused has its row, at this very time
+            log.write(self.time, self.operator.controls)
+        state = self.state
+        log.close(f"{how}, at ({state.x:.3f}, {state.y:.3f}) m")
         self._recorded(log.path)
 
 
@@ -228,6 +261,12 @@ class _Loop:
         self._flight, self._window, self._clock = flight, window, clock
         self._pace = Pace(flight.step_size, time_scale, clock.now())
         self._paused = self._help = self._late = self._ended = False
+        self.stopped = 0
+        """The signal that ended it."""
+
+    def stop(self, signum: int, _frame: object) -> None:
+        """By a signal."""
+        self.stopped, self._ended = signum, True
 
     def run(self) -> None:
         """Until the window is closed."""
@@ -292,10 +331,14 @@ class _Loop:
 
 
 @contextmanager
-def _ended_by_interrupt() -> Iterator[None]:
+def _ended_by_signals(loop: _Loop) -> Iterator[None]:
     """Ctrl-C in the terminal closes the window as its button does, and not in the middle of a step."""
-    before = signal.signal(signal.SIGINT, lambda *_: pygame.event.post(pygame.event.Event(pygame.QUIT)))
+    before = {each: signal.getsignal(each) for each in SIGNALS}
+    for each, handler in before.items():
+        if handler not in (signal.SIG_IGN, signal.SIG_DFL):
+            signal.signal(each, loop.stop)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
