@@ -1,6 +1,6 @@
 """The command as a program: `hovercraft-fmu`, or `python -m hovercraft_fmu`. It can be stopped before all is loaded."""
 
-import _signal  # what `signal` is made of: that takes some time to load
+import _signal  # type: ignore[import-not-found]  # what `signal` is made of: that takes some time to load
 import os
 import sys
 

@@ -775,7 +775,7 @@ def test_stopping_is_no_harm(fmu: Path, tmp_path: Path) -> None:
         'scene = "turn"\nset.integrator = "rk4"\nset.step_size = 0.1\nkeep.distance = true\n'
         "sweep.mass = { from = 50, to = 200, count = 300 }\n"
     )
-    line = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", "sweep"]
+    line = [sys.executable, "-W", "error", "-m", "hovercraft_fmu", "sweep"]
     command = [*line, "many.toml", str(fmu), "--workers", "1"]
     # a background job of a shell ignores it, and so would the sweep
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
