@@ -14,6 +14,7 @@ from .autopilot.guidance import Commands, Gains, Pilot, Sight, Waypoint, steer
 from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
 from .building import default_fmu
 from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
+from .fmu.near_names import did_you_mean, must_be_one_of
 from .host import Fmu, Instance
 from .model.craft import Craft
 from .model.dynamics import Controls, State
@@ -54,7 +55,7 @@ class Passage:
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in COLUMNS:
-            raise ValueError(f"column = {name!r}: must be one of {', '.join(COLUMNS)}")
+            raise ValueError(must_be_one_of("column", name, COLUMNS))
         return self.data[name]
 
     @property
@@ -142,7 +143,8 @@ def _chosen(which: str | Voyage) -> Voyage:
     chosen = voyage(which) if isinstance(which, str) else which
     for name, value in chosen.craft.items():
         if name not in START_VALUES:
-            raise ValueError(f"{name} = {value!r}: must be one of {', '.join(START_VALUES)}")
+            meant = did_you_mean(name, START_VALUES)
+            raise ValueError(f"{name} = {value!r}: must be one of {', '.join(START_VALUES)}{meant}")
     return chosen
 
 
@@ -156,7 +158,7 @@ def _sail(
     progress: Progress | None = None,
 ) -> Passage:
     if scheme not in SCHEMES:
-        raise ValueError(f"scheme = {scheme!r}: must be one of {', '.join(SCHEMES)}")
+        raise ValueError(must_be_one_of("scheme", scheme, SCHEMES))
     h = chosen.communication_step if communication_step is None else communication_step
     end = chosen.stop_time if stop_time is None else stop_time
     for name, value in (("communication_step", h), ("stop_time", end)):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fmu.interface import CRAFT_PARAMETERS, INPUTS
+from .fmu.near_names import must_be_one_of
 from .model.craft import Craft, preset
 from .model.dynamics import State
 
@@ -71,7 +72,7 @@ def signals(rows: Iterable[Row]) -> Signals:
 def scene(name: str) -> Scene:
     """The named scene. Raises ValueError with the names there are."""
     if name not in SCENES:
-        raise ValueError(f"scene = {name!r}: must be one of {', '.join(SCENES)}")
+        raise ValueError(must_be_one_of("scene", name, SCENES))
     return SCENES[name]
 
 
@@ -249,7 +250,7 @@ class Voyage:
 def voyage(name: str) -> Voyage:
     """The named voyage. Raises ValueError with the names there are."""
     if name not in VOYAGES:
-        raise ValueError(f"voyage = {name!r}: must be one of {', '.join(VOYAGES)}")
+        raise ValueError(must_be_one_of("voyage", name, VOYAGES))
     return VOYAGES[name]
 
 

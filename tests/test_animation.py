@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageColor
 
+from hovercraft_fmu.drawing.palette import METHODS
 from hovercraft_fmu.simulation import Result, plan, run_model
 from hovercraft_fmu.view.animation import FRAMES, MovingPicture, Track, animate
-from hovercraft_fmu.view.palette import METHODS
 from tests.conftest import ROOT
 from tests.shell import Shell
 

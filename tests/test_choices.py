@@ -13,7 +13,7 @@ from hovercraft_fmu.fmu.interface import HOVERCRAFT, OUTPUTS, VARIABLES
 from hovercraft_fmu.model.error_estimate import ON
 from hovercraft_fmu.model.integrators import integrator_number
 from hovercraft_fmu.simulation import plan
-from hovercraft_fmu.sweep.study import read_study
+from hovercraft_fmu.sweeps.study import read_study
 from tests.conftest import Fresh
 from tests.lowlevel import everything, get, one, reference
 

@@ -17,6 +17,7 @@ import pytest
 from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
+from hovercraft_fmu.drawing.palette import HULL, WARNING
 from hovercraft_fmu.fmu.icon import outline
 from hovercraft_fmu.fmu.interface import INPUTS, STATES
 from hovercraft_fmu.fmu.start_values import Value
@@ -25,7 +26,6 @@ from hovercraft_fmu.model.dynamics import State
 from hovercraft_fmu.simulation import read_inputs, simulate
 from hovercraft_fmu.view.drive import drive, plan_drive
 from hovercraft_fmu.view.operator import TIME_SCALE
-from hovercraft_fmu.view.palette import HULL, WARNING
 from hovercraft_fmu.view.window import BAR, SIZE, VIEW_LENGTHS
 from tests.conftest import Fresh
 

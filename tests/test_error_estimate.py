@@ -22,7 +22,7 @@ from hovercraft_fmu.scenes import SCENES, Scene, held
 from hovercraft_fmu.simulation import Value, simulate
 from hovercraft_fmu.studies.estimates import KINDS, REPORTED, SEGMENTS, judged, sampled, shares
 from hovercraft_fmu.studies.reference_end import reference_end
-from hovercraft_fmu.sweep import load, sweep
+from hovercraft_fmu.sweeps import load, sweep
 from hovercraft_fmu.view.animation import Track
 from tests.lowlevel import another, count, get, kept, one, put, reference, start
 from tests.shell import Shell

@@ -20,7 +20,7 @@ from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES
 from hovercraft_fmu.fmu.start_values import Value
 from hovercraft_fmu.scenes import SCENES, Signals, signals
 from hovercraft_fmu.simulation import holding, plan, points, read_inputs, run_fmu, run_model, schedule
-from hovercraft_fmu.sweep import load, sweep
+from hovercraft_fmu.sweeps import load, sweep
 from tests.conftest import FLAVOURS
 from tests.reference import reference_loads
 

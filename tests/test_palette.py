@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from PIL import ImageColor
 
+from hovercraft_fmu.drawing.palette import JETS, METHODS, PORT, SERIES, STARBOARD, WINDOW_JETS
 from hovercraft_fmu.model.integrators import INTEGRATORS
-from hovercraft_fmu.view.palette import JETS, METHODS, PORT, SERIES, STARBOARD, WINDOW_JETS
 
 Color = NDArray[np.float64]
 XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])

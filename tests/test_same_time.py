@@ -17,7 +17,7 @@ from hovercraft_fmu.fmu.machine_code import c_file
 from hovercraft_fmu.model.subcycling import meant_step, rounding, substeps
 from hovercraft_fmu.scenes import Signals, signals
 from hovercraft_fmu.simulation import Result, plan, run_fmu, run_model
-from hovercraft_fmu.sweep import load, sweep
+from hovercraft_fmu.sweeps import load, sweep
 from tests.native import Kernel, compile_c
 from tests.strategies import numbers
 

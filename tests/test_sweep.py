@@ -31,14 +31,14 @@ from hovercraft_fmu.model.subcycling import Settings, meant_step, substeps
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Value
 from hovercraft_fmu.studies import carry_out, sweep_costs
-from hovercraft_fmu.sweep import STUDIES, cluster, load, read_study, sweep
-from hovercraft_fmu.sweep import runner as runner_module
-from hovercraft_fmu.sweep.charts import plot_sweep
-from hovercraft_fmu.sweep.engines import Plan
-from hovercraft_fmu.sweep.quantities import FORMULAS, OBSERVED
-from hovercraft_fmu.sweep.study import Factor
-from hovercraft_fmu.sweep.timeline import Leg, merged, timeline
-from hovercraft_fmu.sweep.work import DRIVERS, Job, make_chunk
+from hovercraft_fmu.sweeps import STUDIES, cluster, load, read_study, sweep
+from hovercraft_fmu.sweeps import runner as runner_module
+from hovercraft_fmu.sweeps.charts import plot_sweep
+from hovercraft_fmu.sweeps.engines import Plan
+from hovercraft_fmu.sweeps.quantities import FORMULAS, OBSERVED
+from hovercraft_fmu.sweeps.study import Factor
+from hovercraft_fmu.sweeps.timeline import Leg, merged, timeline
+from hovercraft_fmu.sweeps.work import DRIVERS, Job, make_chunk
 from tests.conftest import FMI_2
 from tests.shell import Shell
 
@@ -508,7 +508,7 @@ def test_a_sweep_goes_on_only_as_it_began(fmu: Path, native_fmu: Path, tmp_path:
 
 KILLED = """
 import json, sys
-from hovercraft_fmu.sweep import sweep
+from hovercraft_fmu.sweeps import sweep
 if __name__ == "__main__":
     sweep(json.loads(sys.argv[1]), sys.argv[2], workers=2, output=sys.argv[3])
 """

@@ -18,6 +18,7 @@ from ..fmu.block import guid
 from ..fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from ..fmu.machine_code import identity
 from ..fmu.native_package import build_native_fmu
+from ..fmu.near_names import explains_keywords, must_be_one_of
 from ..fmu.python_package import build_fmu, hovercraft_content, python_identity
 from ..fmu.start_values import Value, variant
 from ..whole import temporary_folder
@@ -94,6 +95,7 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
 assert tuple(PRODUCTS) == get_args(Kind)
 
 
+@explains_keywords
 def build(
     kind: Kind = "native",
     path: str | os.PathLike[str] | None = None,
@@ -142,7 +144,7 @@ def product(kind: str) -> Product:
     for known, row in PRODUCTS.items():
         if kind == known:
             return row
-    raise ValueError(f"kind = {kind!r}: must be one of {', '.join(PRODUCTS)}")
+    raise ValueError(must_be_one_of("kind", kind, PRODUCTS))
 
 
 def default_kind() -> Kind:

@@ -22,9 +22,9 @@ DEMO_FOLDER = FOLDER / "demo"
 def demo(loop: bool) -> None:
     """Build the FMUs, check them, and drive them over a recorded control log; see build/demo/."""
     from ..building import default_kind
+    from ..drawing.figures import check_plot
     from ..scenes import CONTROL_LOGS, SCENES
     from ..simulation import holding, plan
-    from ..view.plots import check_plot
 
     picture = check_plot(DEMO_FOLDER / ("loop.png" if loop else "ice.png"))
     native = _built_and_valid(default_kind())

@@ -65,11 +65,11 @@ def sweep(
     build/HovercraftNative.fmu, which is built if it is not there. A sweep that was ended goes on where it was with the
     same command.
     """
-    from ..sweep import read_study, sweep
+    from ..sweeps import read_study, sweep
 
     chosen = read_study(study)
     if plot:
-        from ..view.plots import check_plot
+        from ..drawing.figures import check_plot
 
         check_plot(plot)
     make_room(plot)
@@ -85,7 +85,7 @@ def sweep(
         OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
     _print_extremes(outcome.folder)
     if plot:
-        from ..sweep.charts import plot_sweep
+        from ..sweeps.charts import plot_sweep
 
         OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
 
@@ -99,7 +99,7 @@ class _Rate(ProgressColumn):
 
 
 def _print_extremes(folder: Path) -> None:
-    from ..sweep.store import extremes
+    from ..sweeps.store import extremes
 
     table = Table(box=None, pad_edge=False)
     for title in ("column", "least", "of the run with", "greatest", "of the run with"):

@@ -78,7 +78,7 @@ def simulate(
     inputs: Inputs = log if log else scene or "launch"
     others = [{**start_values, **settings_of(against.split(","), "--against")}] if against is not None else []
     if plot:
-        from ..view.plots import check_plot
+        from ..drawing.figures import check_plot
 
         check_plot(plot)
     if animation:
@@ -213,21 +213,7 @@ def _print_scenes() -> None:
 
 def print_result(result: "Result") -> None:
     """What came of a run, in a few lines."""
-    run = result.run
-    rows = {
-        "duration": f"{result['time'][-1] - run.start_time:g} s, {len(result['time']) - 1} communication steps",
-        "sub-steps": f"{result['substeps'][-1]}",
-        "distance": f"{result.distance:.2f} m, {result.distance / run.craft.length:.1f} craft lengths",
-        "largest speed": f"{result['speed'].max():.3f} m/s",
-        "headings": f"{math.degrees(result['pose.heading'].min()):.1f} ... "
-        f"{math.degrees(result['pose.heading'].max()):.1f} deg",
-        "end position": f"({result['pose.x'][-1]:.3f}, {result['pose.y'][-1]:.3f}) m",
-        "end heading": f"{math.degrees(result['pose.heading'][-1]):.2f} deg",
-        "end speed": f"{result['speed'][-1]:.4f} m/s",
-    }
-    if result.is_estimated:
-        rows["error, as told"] = result.error_in_words
-    print_rows(f"{run.title}: {run.method}", rows)
+    print_rows(f"{result.run.title}: {result.run.method}", result.in_words)
     for warning in result.warnings:
         OUTPUT.print(f"warning: {warning}")
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from hovercraft_fmu import Crafts, advance_fleet
+from hovercraft_fmu.drawing.figures import check_plot, new_figure
+from hovercraft_fmu.drawing.palette import SHADES
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator_number
 from hovercraft_fmu.model.subcycling import Settings
-from hovercraft_fmu.view.palette import SHADES
-from hovercraft_fmu.view.plots import check_plot, new_figure
 
 COUNT, SECONDS = 10_000, 60
 RK4 = Settings(step_size=0.1, integrator=INTEGRATORS[integrator_number("rk4") - 1])

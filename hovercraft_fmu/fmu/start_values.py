@@ -11,6 +11,7 @@ import numpy as np
 from ..model.craft import preset
 from .description import Flavour
 from .interface import BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT
+from .near_names import did_you_mean, must_be_one_of
 from .python.slave import HovercraftSlave
 from .variable import Enumeration
 
@@ -41,8 +42,9 @@ def start_value(name: str, value: Value) -> float | int:
     """
     variable = BY_NAME.get(name)
     if variable is None or variable.start is None:
-        settable = ", ".join(each.name for each in BY_NAME.values() if each.start is not None)
-        raise ValueError(f"{name} = {value}: must be a variable that can be set: {settable}")
+        settable = [each.name for each in BY_NAME.values() if each.start is not None]
+        meant = did_you_mean(name, settable)
+        raise ValueError(f"{name} = {value}: must be a variable that can be set: {', '.join(settable)}{meant}")
     if variable.enumeration and isinstance(value, str) and not value.isdigit():
         return _item(name, value, variable.enumeration)
     try:
@@ -63,7 +65,7 @@ def start_value(name: str, value: Value) -> float | int:
 def _item(name: str, value: str, enumeration: Enumeration) -> int:
     number = enumeration.number(value)
     if number is None:
-        raise ValueError(f"{name} = {value!r}: must be one of {', '.join(item for item, _ in enumeration.items)}")
+        raise ValueError(must_be_one_of(name, value, [item for item, _ in enumeration.items]))
     return number
 
 

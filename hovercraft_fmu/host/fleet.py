@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..fmu.machine_code import NotCompiledError, fleet_library
+from ..fmu.near_names import explains_keywords
 from ..model.craft import CONSTANT, DERIVED, DIRECTIONAL, Craft, check_parameter
 from ..model.dynamics import Controls, State
 from ..model.integrators import INTEGRATORS, StepTooSmallError
@@ -121,6 +122,7 @@ class Crafts:
         return cls(**{name: [getattr(each, name) for each in every] for name in PARAMETERS})
 
 
+@explains_keywords
 def advance_fleet(
     states: Rows,
     controls: Rows,

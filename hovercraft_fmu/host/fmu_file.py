@@ -9,6 +9,7 @@ from typing import Any
 import fmpy
 
 from ..fmu.interface import HOVERCRAFT
+from ..fmu.near_names import beside
 from ..stopping import Interruptible
 from ..whole import check_survived, temporary_folder
 from .instance import Instance, Intermediate
@@ -94,7 +95,8 @@ def read_description(path: Path, validate: bool = True, model: str | None = None
             another model than the given one.
     """
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such FMU; 'hovercraft-fmu build' writes them into build/")
+        hint = beside(path) or "; 'hovercraft-fmu build' writes them into build/"
+        raise FileNotFoundError(f"{path}: no such FMU{hint}")
     try:
         description = fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds

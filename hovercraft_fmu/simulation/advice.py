@@ -10,6 +10,7 @@ import numpy as np
 
 from ..building import default_fmu
 from ..fmu.interface import ERROR_LOST, STEP_TURNS, STEP_UNSTABLE
+from ..fmu.near_names import explains_keywords
 from ..fmu.start_values import Value
 from ..fmu.start_values import start_values as numbers
 from ..host import SimulationError
@@ -82,6 +83,7 @@ class Advice:
         return self.best.true <= self.within
 
 
+@explains_keywords
 def advise(
     scene_or_inputs: Inputs = "launch",
     fmu: str | os.PathLike[str] | None = None,

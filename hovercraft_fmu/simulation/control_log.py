@@ -11,11 +11,12 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
+from ..fmu.near_names import beside, did_you_mean
 from ..scenes import Signals
 
 TIME = "time"
@@ -88,7 +89,10 @@ def read_control_log(path: str | os.PathLike[str]) -> ControlLog:
 
 
 def _text(source: Path) -> str:
-    content = source.read_bytes()
+    try:
+        content = source.read_bytes()
+    except FileNotFoundError as error:
+        raise FileNotFoundError(error.errno, f"{error.strerror}{beside(source)}", str(source)) from error
     encoding = "utf-16" if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
     try:
         text = content.decode(encoding)
@@ -123,7 +127,8 @@ def _names(source: Path, header: Line) -> dict[int, str]:
         found = NAME.fullmatch(cell)
         name = known.get(found["name"].lower()) if found else None
         if name is None:
-            _refuse(source, header.number, f"column {cell!r}: must be 'time' or an input: {', '.join(INPUTS)}")
+            rule = f"must be 'time' or an input: {', '.join(INPUTS)}{did_you_mean(cell, (TIME, *INPUTS))}"
+            _refuse(source, header.number, f"column {cell!r}: {rule}")
         unit = "s" if name == TIME else BY_NAME[name].unit or ""
         if found and found["unit"] not in (None, unit) and (name == TIME or name in INPUTS):
             _refuse(source, header.number, f"column {cell!r}: must be in {unit!r}")
@@ -163,6 +168,37 @@ def _refuse(source: Path, line: int, what: str) -> NoReturn:
     raise ValueError(f"{source}, line {line}: {what}")
 
 
+def columns_as_signals(columns: Any) -> Signals:
+    """A table of inputs from names and columns: a mapping, a DataFrame of pandas or polars, a `Result`.
+
+    An index named `time` is a column, too; columns of outputs and local variables are passed over.
+
+    Raises:
+        ValueError: as `checked_signals` does; columns of different lengths, or what are no numbers.
+    """
+    if getattr(columns, "whole", None) is not None:  # of a result: with both rows of every jump
+        columns = {name: columns.whole[name] for name in columns}
+    names = [str(name) for name in (columns.keys() if hasattr(columns, "keys") else columns.columns)]
+    found = {name: columns[name] for name in names if name in (TIME, *INPUTS) or name not in SHOWN}
+    index = getattr(columns, "index", None)
+    if TIME not in found and getattr(index, "name", None) == TIME:
+        found[TIME] = index
+    if TIME not in found:
+        raise ValueError(f"inputs: there must be a column 'time'; the columns are {', '.join(names)}")
+    order = (TIME, *(name for name in found if name != TIME))
+    try:
+        arrays = [np.asarray(found[name], np.float64) for name in order]
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"inputs: every column must be numbers; {error}") from error
+    if len({each.shape for each in arrays}) > 1 or arrays[0].ndim != 1:
+        lengths = ", ".join(f"{name} {each.shape}" for name, each in zip(order, arrays, strict=True))
+        raise ValueError(f"inputs: every column must have one value a row; the shapes are {lengths}")
+    table = np.empty(len(arrays[0]), dtype=[(name, np.float64) for name in order])
+    for name, column in zip(order, arrays, strict=True):
+        table[name] = column
+    return checked_signals(table, "inputs")
+
+
 def checked_signals(table: Signals, source: str) -> Signals:
     """The table, if it can be inputs; `source` is what the message calls it. Raises ValueError as `read_inputs`."""
     names = table.dtype.names or ()
@@ -170,7 +206,9 @@ def checked_signals(table: Signals, source: str) -> Signals:
         raise ValueError(f"{source}: the first column must be 'time', with at least one row; the columns are {names}")
     for name in names[1:]:
         if name not in INPUTS:
-            raise ValueError(f"{source}: column {name!r} must be an input: {', '.join(INPUTS)}")
+            raise ValueError(
+                f"{source}: column {name!r} must be an input: {', '.join(INPUTS)}{did_you_mean(name, INPUTS)}"
+            )
     for name in names:
         for row, value in enumerate(table[name], 1):
             if not math.isfinite(value):

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..building import default_fmu
 from ..fmu.interface import BY_NAME, HOVERCRAFT, INPUTS
+from ..fmu.near_names import explains_keywords
 from ..fmu.start_values import Value, start_value
 from ..host import Fmu
 from ..host.ramps import Ramps
@@ -20,6 +21,7 @@ from .recording import recorded
 from .result import Result
 
 
+@explains_keywords
 def simulate(
     scene_or_inputs: Inputs = "launch",
     fmu: str | os.PathLike[str] | None = None,

@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import ceil, isfinite, ulp
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import psutil
 
 from ..fmu.interface import BY_NAME, CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
+from ..fmu.near_names import explains_keywords
 from ..fmu.start_values import Value
 from ..fmu.start_values import start_values as numbers
 from ..model.craft import PRESETS, Craft, preset
@@ -18,10 +19,20 @@ from ..model.dynamics import State
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..scenes import Scene, Signals, scene, signals
-from .control_log import SHOWN, ControlLog, checked_signals, read_control_log
+from .control_log import SHOWN, ControlLog, checked_signals, columns_as_signals, read_control_log
 
-Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals
-"""A scene or its name; a CSV file (a name that ends in .csv); a structured array with `time` and input names."""
+
+class Columns(Protocol):
+    """Names and columns, `time` [s] among them: a dict, a DataFrame (whose index may be the time), or a `Result`."""
+
+    def __getitem__(self, name: str, /) -> Any: ...
+
+
+Function: TypeAlias = Callable[[float], Mapping[str, float]]
+"""Of the time [s]: inputs by name. Taken at every communication point, linear in between."""
+Inputs: TypeAlias = str | os.PathLike[str] | Scene | Signals | Columns | Function
+"""A scene or its name; a CSV file (a name that ends in .csv); a structured array with `time` and input names; columns;
+a function of time. Columns of outputs, which a result has, are passed over."""
 Progress: TypeAlias = Callable[[float], None]
 """Called with the time [s] reached, after every communication step."""
 
@@ -106,6 +117,7 @@ class Run:
         return self.start_values.get(name, 0.0 if default is None else default)
 
 
+@explains_keywords
 def plan(
     scene_or_inputs: Inputs = "launch",
     *,
@@ -129,6 +141,8 @@ def plan(
         ValueError: names the argument, the value and the rule.
     """
     chosen = _scene(scene_or_inputs)
+    if callable(scene_or_inputs):
+        scene_or_inputs = sampled(scene_or_inputs, start_time, stop_time, communication_step)
     log = _log(chosen, scene_or_inputs)
     table = log.table
     given = numbers(start_values or {})
@@ -164,15 +178,39 @@ def _scene(scene_or_inputs: Inputs) -> Scene | None:
 def _title(chosen: Scene | None, scene_or_inputs: Inputs) -> str:
     if chosen:
         return chosen.name
-    return "inputs" if isinstance(scene_or_inputs, np.ndarray) else Path(cast(str, scene_or_inputs)).name
+    return Path(scene_or_inputs).name if isinstance(scene_or_inputs, str | os.PathLike) else "inputs"
 
 
-def _log(chosen: Scene | None, source: Inputs) -> ControlLog:
+def _log(chosen: Scene | None, source: Any) -> ControlLog:
     if chosen:
         return ControlLog(chosen.signals, False)
-    if isinstance(source, np.ndarray):
+    if isinstance(source, str | os.PathLike):
+        return read_control_log(source)
+    if isinstance(source, np.ndarray) and source.dtype.names:
         return ControlLog(checked_signals(source, "inputs"), False)
-    return read_control_log(cast("str | os.PathLike[str]", source))
+    if hasattr(source, "keys") or hasattr(source, "columns"):
+        return ControlLog(columns_as_signals(source), False)
+    raise ValueError(
+        f"inputs = {type(source).__name__}: must be a scene, a CSV file, a structured array, columns (a dict, a "
+        "DataFrame, a Result) or a function of time"
+    )
+
+
+def sampled(function: Function, start: float | None, stop: float | None, step: float | None) -> Signals:
+    """The inputs that a function of time gives at every communication point [s]; by default as an FMU alone is run.
+
+    Raises ValueError as `plan` does, and for what is no mapping of inputs.
+    """
+    start, stop = 0.0 if start is None else start, HOVERCRAFT.stop_time if stop is None else stop
+    step = HOVERCRAFT.communication_step if step is None else step
+    if mistakes := list(_mistakes(start, stop, step)):
+        raise MistakesError(mistakes)
+    check_steps(start, stop, step, 1 + len(INPUTS))
+    times = np.append(start + step * np.arange(ceil((stop - start) / step)), stop)
+    values = [function(float(time)) for time in times]
+    if wrong := [each for each in values if not isinstance(each, Mapping) or each.keys() != values[0].keys()]:
+        raise ValueError(f"inputs: a function must give the same inputs by name at every time, and gave {wrong[0]!r}")
+    return columns_as_signals({"time": times, **{name: [each[name] for each in values] for name in values[0]}})
 
 
 def _completed(table: Signals, values: Mapping[str, float | int]) -> Signals:
@@ -209,14 +247,13 @@ def check_effect(values: Mapping[str, object], driven: Iterable[str], title: str
 
 
 def _check_times(run: Run) -> None:
-    mistakes = list(_mistakes(run))
+    mistakes = list(_mistakes(run.start_time, run.stop_time, run.communication_step))
     if mistakes:
         raise MistakesError(mistakes)
     check_steps(run.start_time, run.stop_time, run.communication_step, 1 + len(SHOWN))
 
 
-def _mistakes(run: Run) -> Iterator[str]:
-    start, stop, step = run.start_time, run.stop_time, run.communication_step
+def _mistakes(start: float, stop: float, step: float) -> Iterator[str]:
     for name, value in (("start_time", start), ("stop_time", stop), ("communication_step", step)):
         if isinstance(value, bool) or not isfinite(value):
             yield f"{name} = {value!r} s: must be a finite number"

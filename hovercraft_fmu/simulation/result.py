@@ -1,9 +1,12 @@
 """What a run gave: one kind of result, on an FMU or on the bare model."""
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
+from html import escape
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import fmpy
 import fmpy.simulation
@@ -11,14 +14,23 @@ import fmpy.util
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fmu.interface import ERROR_LOST
+from ..drawing.run_picture import draw_run, path_svg
+from ..fmu.interface import BY_NAME, ERROR_LOST
+from ..fmu.near_names import must_be_one_of
 from ..model.error_estimate import ON
 from .planning import Run
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Result:
-    """What a run gave: `result["time"]`, `result["pose.x"]`, ..., one value a communication point, shape (n,)."""
+    """What a run gave: `result["time"]`, `result["pose.x"]`, ..., one value a communication point, shape (n,).
+
+    As in a table of pandas: `len` is the number of rows, `in` and `for` go over the names of columns.
+    """
 
     data: NDArray[np.void]
     run: Run
@@ -30,8 +42,33 @@ class Result:
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self.names:
-            raise ValueError(f"column = {name!r}: must be one of {', '.join(self.names)}")
+            raise ValueError(must_be_one_of("column", name, self.names))
         return self.data[name]
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __repr__(self) -> str:
+        rows = (f"  {name:14} {text}" for name, text in self.in_words.items())
+        warned = (f"  warning        {warning}" for warning in self.warnings)
+        return "\n".join([f"Result of {self.run.title}: {self.run.method}", *rows, *warned])
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the path, and what the text says."""
+        rows = "".join(f"<tr><th>{name}</th><td>{text}</td></tr>" for name, text in self.in_words.items())
+        said = "".join(f"<p>warning: {escape(warning)}</p>" for warning in self.warnings)
+        title = escape(f"{self.run.title}: {self.run.method}")
+        return f"<p><b>{title}</b></p>{path_svg(self['pose.x'], self['pose.y'])}<table>{rows}</table>{said}"
+
+    def keys(self) -> tuple[str, ...]:
+        """The names of the columns; so `dict(result)` is one of arrays."""
+        return self.names
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,6 +98,48 @@ class Result:
         if self.is_lost:
             return "cannot be told: see the warning"
         return f"at the end {metres(off[-1])} off ({share:.2g} % of the path), at most {metres(off.max())}"
+
+    @property
+    def in_words(self) -> dict[str, str]:
+        """What came of the run, in a few lines."""
+        craft, headings = self.run.craft, np.degrees(self["pose.heading"])
+        words = {
+            "duration": f"{self['time'][-1] - self.run.start_time:g} s, {len(self) - 1} communication steps",
+            "sub-steps": f"{self['substeps'][-1]}",
+            "distance": f"{self.distance:.2f} m, {self.distance / craft.length:.1f} craft lengths",
+            "largest speed": f"{self['speed'].max():.3f} m/s",
+            "headings": f"{headings.min():.1f} ... {headings.max():.1f} deg",
+            "end position": f"({self['pose.x'][-1]:.3f}, {self['pose.y'][-1]:.3f}) m",
+            "end heading": f"{headings[-1]:.2f} deg",
+            "end speed": f"{self['speed'][-1]:.4f} m/s",
+        }
+        return {**words, "error, as told": self.error_in_words} if self.is_estimated else words
+
+    @property
+    def title(self) -> str:
+        """Of a picture."""
+        told = f"; {self.error_in_words}" if self.is_estimated else ""
+        return f"{self.run.title}: {self.distance:.0f} m in {self['time'][-1] - self['time'][0]:g} s{told}"
+
+    def plot(self) -> "Figure":
+        """The path with the craft along it, controls, speed and heading over time: a Figure of matplotlib's.
+
+        Raises ModuleNotFoundError: matplotlib is not installed; says how to install it.
+        """
+        return draw_run(self, self.run.craft, self.title, self.is_estimated)
+
+    def to_pandas(self) -> "DataFrame":
+        """A DataFrame: a row a communication point, `time` [s] the index, the units of the columns in `attrs["units"]`.
+
+        Raises ModuleNotFoundError: pandas is not installed; says how to install it.
+        """
+        try:
+            pandas = import_module("pandas")
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError("to_pandas needs pandas, which is not installed: pip install pandas") from error
+        frame: DataFrame = pandas.DataFrame({name: self[name] for name in self}).set_index("time")
+        frame.attrs["units"] = {name: BY_NAME[name].unit or "1" for name in frame if name in BY_NAME}
+        return frame
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write all columns as CSV, with all digits; as inputs of a run the file gives the same motion again.

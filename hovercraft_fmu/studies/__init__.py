@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from ..fmu.near_names import must_be_one_of
+
 NEEDED = ("matplotlib", "polars", "scipy")
 
 
@@ -45,7 +47,7 @@ def carry_out(name: str, quick: bool, folder: Path, tell: Callable[[float], None
         OSError: a file cannot be written; a program that is measured failed.
     """
     if name not in MEASUREMENTS:
-        raise ValueError(f"measurement = {name!r}: must be one of {', '.join(MEASUREMENTS)}")
+        raise ValueError(must_be_one_of("measurement", name, MEASUREMENTS))
     try:
         for package in NEEDED:  # what draws is imported late: it is to be missed before the work
             importlib.import_module(package)

@@ -10,12 +10,12 @@ from scipy.integrate import solve_ivp
 
 from ..autopilot.guidance import Pilot, Waypoint, helm, line_of_sight, wanted_force
 from ..coupling import GAUSS_SEIDEL, JACOBI, SCHEMES, BareAutopilot, BareCraft, sail_bare
+from ..drawing.figures import new_figure
+from ..drawing.palette import INK, METHODS, OTHER, QUIET
 from ..model.dynamics import Controls, State, derivatives
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..scenes import VOYAGES
-from ..view.palette import INK, METHODS, OTHER, QUIET
-from ..view.plots import new_figure
 from .laboratory import Findings, Shown, Tell, part
 from .reference_end import TOLERANCES
 from .work_precision import fitted

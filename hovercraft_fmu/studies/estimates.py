@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import polars as pl
 
+from ..drawing.figures import new_figure
+from ..drawing.palette import INK, METHODS
 from ..fmu.native_package import build_native_fmu
 from ..host.fleet import Crafts, Fleet, advance_fleet
 from ..model.dynamics import Controls, State
@@ -20,8 +22,6 @@ from ..model.integrators import INTEGRATORS, Integrator
 from ..model.subcycling import Settings
 from ..scenes import SCENES
 from ..simulation import advise, metres
-from ..view.palette import INK, METHODS
-from ..view.plots import new_figure
 from ..whole import temporary_folder
 from .laboratory import Findings, Shown, Tell
 

@@ -28,9 +28,9 @@ from ..fmu.python_package import build_fmu
 from ..model.integrators import INTEGRATORS
 from ..scenes import CONTROL_LOGS, SCENES, VOYAGES
 from ..simulation import plan, run_model
-from ..sweep import sweep
-from ..sweep.charts import plot_sweep
-from ..sweep.study import SHIPPED
+from ..sweeps import sweep
+from ..sweeps.charts import plot_sweep
+from ..sweeps.study import SHIPPED
 from ..view.diagram import draw_diagram
 from ..view.plots import plot_passage, plot_run
 from ..whole import temporary_folder

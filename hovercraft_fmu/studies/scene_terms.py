@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import polars as pl
 
+from ..drawing.figures import new_figure
+from ..drawing.palette import INK, SHADES
 from ..fmu.start_values import Value
 from ..model.craft import DIRECTIONAL
 from ..model.dynamics import State
 from ..model.subcycling import advance, meant_step
 from ..scenes import SCENES, Scene
 from ..simulation import held_steps, plan
-from ..view.palette import INK, SHADES
-from ..view.plots import new_figure
 from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread
 
 if TYPE_CHECKING:

@@ -56,11 +56,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import polars as pl
 
+from ..drawing.figures import new_figure
+from ..drawing.palette import INK, METHODS, QUIET
 from ..host.fleet import Crafts
 from ..model.dynamics import Controls, State
 from ..model.integrators import Integrator
-from ..view.palette import INK, METHODS, QUIET
-from ..view.plots import new_figure
 from .extremes import BATCH, FIXED, Array, Batch, Mask, advanced, chosen, made, measure_extremes, shares
 from .laboratory import Findings, Shown, Tell, part
 

@@ -19,8 +19,8 @@ from ..fmu.interface import STATES
 from ..fmu.native_package import build_native_fmu
 from ..fmu.python_package import build_fmu
 from ..simulation import plan
-from ..sweep.runner import BATCH, FMU, sweep
-from ..sweep.study import read_study
+from ..sweeps.runner import BATCH, FMU, sweep
+from ..sweeps.study import read_study
 from ..whole import temporary_folder
 from .laboratory import Findings, Shown, Tell, interleaved
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 import polars as pl
 
+from ..drawing.figures import new_figure
+from ..drawing.palette import METHODS
 from ..fmu.interface import INPUTS, OUTPUTS, STATES
 from ..host import Instance
 from ..model.dynamics import Controls, State, windy
 from ..model.subcycling import advance, meant_step
 from ..scenes import SCENES, Scene
 from ..simulation import Run, held_steps, holding, method_in_words, metres, plan, schedule
-from ..view.palette import METHODS
-from ..view.plots import new_figure
 from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread
 from .reference_end import reference_end
 

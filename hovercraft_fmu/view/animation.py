@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageColor
 
+from ..drawing.figures import new_figure
+from ..drawing.palette import FAINT_LINE, INK, JETS, METHODS, OTHER, QUIET, SERIES
+from ..drawing.shapes import Shape, jets, placed
 from ..fmu.icon import outline
+from ..fmu.near_names import explains_keywords
 from ..simulation import Result, metres
-from .palette import FAINT_LINE, INK, JETS, METHODS, OTHER, QUIET, SERIES
-from .plots import new_figure
-from .shapes import Shape, jets, placed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,8 +101,14 @@ def check_animation(path: str | os.PathLike[str]) -> Path:
     return path
 
 
-def animate(results: Sequence[Result], path: str | os.PathLike[str], tell: Tell = lambda _: None) -> Path:
+@explains_keywords
+def animate(results: Result | Sequence[Result], path: str | os.PathLike[str], tell: Tell = lambda _: None) -> Path:
     """Write one run, or two over the same communication points, as a GIF or as a page that needs no network.
+
+    Args:
+        results: the run, or both.
+        path: ends in .gif or .html; its folder is made.
+        tell: called with the part of the work that is done, 0 to 1.
 
     Raises:
         ValueError: see `check_animation`; more than two runs, or runs over different times.
@@ -109,6 +116,7 @@ def animate(results: Sequence[Result], path: str | os.PathLike[str], tell: Tell 
         OSError: the file cannot be written.
     """
     path = check_animation(path)
+    results = [results] if isinstance(results, Result) else results
     if not 1 <= len(results) <= 2:
         raise ValueError(f"results = {len(results)} runs: must be one or two")
     if not np.array_equal(results[0]["time"], results[-1]["time"]):

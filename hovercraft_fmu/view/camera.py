@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 
-from .shapes import Shape, placed
+from ..drawing.shapes import Shape, placed
 
 Point: TypeAlias = tuple[float, float]
 START = (0.1, 0.5)

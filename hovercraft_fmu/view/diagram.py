@@ -3,10 +3,10 @@
 import math
 from typing import TYPE_CHECKING
 
+from ..drawing.figures import new_figure
+from ..drawing.palette import INK, JETS, QUIET, SEA
 from ..fmu.icon import outline
 from ..model.craft import Craft
-from .palette import INK, JETS, QUIET, SEA
-from .plots import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

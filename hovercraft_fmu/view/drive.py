@@ -11,7 +11,9 @@ from time import perf_counter
 from types import TracebackType
 from typing import Protocol
 
+from ..building import default_fmu
 from ..fmu.interface import INPUTS, STATES
+from ..fmu.near_names import explains_keywords
 from ..fmu.start_values import Value
 from ..model.dynamics import Controls, State
 from ..scenes import signals
@@ -70,10 +72,14 @@ class WallClock:
         self._frames.tick(FRAME_RATE)
 
 
+@explains_keywords
 def plan_drive(
     preset: str = PRESET, start_values: Mapping[str, Value] | None = None, communication_step: float | None = None
 ) -> Run:
-    """What a drive needs, checked. Raises ValueError as `plan` does, and for an impossible craft or step."""
+    """What a drive needs, checked: preset, start_values and communication_step [s] as of `plan`, over no scene.
+
+    Raises ValueError as `plan` does, and for an impossible craft or step.
+    """
     check_effect(start_values or {}, KEYED, "a drive")
     run = plan(signals([(0.0,)]), preset=preset, start_values=start_values, communication_step=communication_step)
     step = run.communication_step
@@ -85,9 +91,10 @@ def plan_drive(
     return run
 
 
+@explains_keywords
 def drive(
-    run: Run,
-    fmu: str | os.PathLike[str],
+    run: Run | None = None,
+    fmu: str | os.PathLike[str] | None = None,
     *,
     record: str | os.PathLike[str] | None = None,
     recorded: Callable[[Path], None] = lambda _: None,
@@ -97,8 +104,8 @@ def drive(
     """Open a window and drive the FMU until it is closed; return the state that it ended in.
 
     Args:
-        run: see `plan_drive`.
-        fmu: the file.
+        run: see `plan_drive`, which is asked where none is given.
+        fmu: the file; without it the native FMU in build/ under the current folder, which is built if it is not there.
         record: where the control log goes, a row a communication point, two where controls change: `simulate` over it,
             with the same craft, settings and communication step, comes to the same bits. After a reset the next one
             goes beside it.
@@ -112,8 +119,9 @@ def drive(
     """
     if not SLOWEST <= time_scale <= FASTEST:
         raise ValueError(f"time_scale = {time_scale!r}: must be from {SLOWEST:g} to {FASTEST:g}")
+    run = run or plan_drive()
     with (
-        stepping(run, fmu) as stepper,
+        stepping(run, default_fmu() if fmu is None else fmu) as stepper,
         Flight(stepper, run, Path(record) if record else None, recorded) as flight,
         closing(Window(run.craft, f"hovercraft: {run.method}")) as window,
     ):

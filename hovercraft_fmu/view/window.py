@@ -6,12 +6,12 @@ from itertools import pairwise
 from math import atan2, cos, degrees, hypot, radians, sin
 from typing import NamedTuple
 
+from ..drawing.palette import FAINT, GRID, GROUND, HULL, PANEL, TEXT, TRAIL, WARNING, WINDOW_JETS
+from ..drawing.shapes import jets
 from ..fmu.icon import outline
 from ..model.craft import Craft
 from ..model.dynamics import Controls
 from .camera import Camera, Point
-from .palette import FAINT, GRID, GROUND, HULL, PANEL, TEXT, TRAIL, WARNING, WINDOW_JETS
-from .shapes import jets
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 try:

@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from ..view.palette import SEA, SHADES
-from ..view.plots import check_plot, new_figure
+from ..drawing.figures import check_plot, new_figure, save
+from ..drawing.palette import SEA, SHADES
 from .quantities import display
 from .store import KEY, TRAJECTORIES, load
 from .study import GRID
@@ -57,9 +57,7 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
         figure = _panels(table, [(name, tuple(swept)) for name in kept], 2, way)
     failed = runs.num_rows - runs["error"].null_count
     figure.suptitle(f"{about['name']}: {runs.num_rows} runs" + (f", {failed} failed" if failed else ""))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, format="png", metadata={"Software": None})
-    return path
+    return save(figure, path)
 
 
 def _shown(table: pa.Table, name: str) -> NDArray[np.float64]:

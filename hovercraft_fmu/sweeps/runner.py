@@ -16,6 +16,7 @@ import numpy as np
 from .._version import __version__
 from ..building import default_fmu
 from ..fmu.interface import HOVERCRAFT
+from ..fmu.near_names import explains_keywords, must_be_one_of
 from ..host import read_description
 from ..model.error_estimate import ON
 from ..simulation.fmu_run import own_starts
@@ -56,6 +57,7 @@ class Outcome(NamedTuple):
     """The first of the errors, with the number of its run."""
 
 
+@explains_keywords
 def sweep(
     study: str | Path | Mapping[str, Any] | Study,
     fmu: str | os.PathLike[str] | None = None,
@@ -132,7 +134,7 @@ def _numbers(chunk: int, size: int, runs: int) -> Any:
 def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple[Job, dict[str, Any]]:
     """What goes to the workers, and the metadata of the results."""
     if engine not in ENGINES:
-        raise ValueError(f"engine = {engine!r}: must be one of {', '.join(ENGINES)}")
+        raise ValueError(must_be_one_of("engine", engine, ENGINES))
     content = None
     if engine == BATCH:
         if fmu is not None:

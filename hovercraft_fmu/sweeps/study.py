@@ -15,6 +15,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 from ..fmu.interface import BY_NAME, INPUTS
+from ..fmu.near_names import beside, did_you_mean, must_be_one_of
 from ..fmu.start_values import start_value
 from ..model.craft import Craft, check_parameter
 from ..model.integrators import integrator
@@ -144,7 +145,8 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
         return _study(source, "study", Path())
     path = SHIPPED / f"{source}.toml" if str(source) in STUDIES else Path(source)
     if not path.exists():
-        raise FileNotFoundError(f"study = {str(source)!r}: must be a TOML file, or one of {', '.join(STUDIES)}")
+        meant = did_you_mean(source, STUDIES) or beside(path)
+        raise FileNotFoundError(f"study = {str(source)!r}: must be a TOML file, or one of {', '.join(STUDIES)}{meant}")
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:  # of TOML, or of the encoding
@@ -230,7 +232,7 @@ def _content(table: Mapping[str, Any], log: Signals | None) -> str:
 
 def _known(table: Mapping[str, Any], keys: Iterable[str], where: str) -> None:
     Mistakes(
-        f"{where}{key} = {value!r}: the key must be one of {', '.join(keys)}"
+        f"{where}{key} = {value!r}: the key must be one of {', '.join(keys)}{did_you_mean(key, keys)}"
         for key, value in table.items()
         if key not in keys
     ).tell()
@@ -273,7 +275,7 @@ def _whole(value: Any, key: str, least: int) -> int:
 def _names(value: Any, key: str, known: Iterable[str]) -> tuple[str, ...]:
     if not isinstance(value, list) or len(set(map(str, value))) != len(value):
         raise ValueError(f"{key} = {value!r}: must be a list of names, each once")
-    Mistakes(f"{key} = {name!r}: must be one of {', '.join(known)}" for name in value if name not in known).tell()
+    Mistakes(must_be_one_of(key, name, known) for name in value if name not in known).tell()
     return tuple(value)
 
 

@@ -1,0 +1,1 @@
+"""What pictures are made of, and the picture of one run."""
