@@ -4,11 +4,13 @@ import csv
 import itertools
 import json
 import math
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -482,7 +484,110 @@ def test_the_metadata_tells_where_the_rows_come_from(fmu: Path, tmp_path: Path) 
     assert about["fmu_sha256"] == hashlib.sha256(fmu.read_bytes()).hexdigest()
     assert {"python", "numpy", "scipy", "pyarrow", "dask"} == about["versions"].keys()
     # any one file is plain Parquet, and says the same
-    assert json.loads(pq.read_schema(next((tmp_path / "runs").glob("*.parquet"))).metadata[b"hovercraft_fmu"]) == about
+    one = json.loads(pq.read_schema(tmp_path / "runs" / "00002.parquet").metadata[b"hovercraft_fmu"])
+    assert one.items() >= about.items()
+    assert (one["what"], one["number"], one["rows"]) == ("runs", 2, 1)
+    assert one["study_sha256"] == hashlib.sha256(one["study"].encode()).hexdigest()
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1000])
+
+
+def _flip(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 5] ^= 1
+    path.write_bytes(content)
+
+
+def _copy_over(path: Path) -> None:
+    path.write_bytes(path.with_name("00001.parquet").read_bytes())
+
+
+def _tamper(path: Path) -> None:
+    path.write_bytes(path.read_bytes().replace(b'"engine": "batch"', b'"engine": "birch"'))
+
+
+def _other_study(path: Path) -> None:
+    sweep(but(KEPT, set={"step_size": 0.1}), engine="batch", workers=1, output=path.parents[1] / "other")
+    path.write_bytes((path.parents[1] / "other" / path.parent.name / path.name).read_bytes())
+
+
+KEPT = but(keep={"end": ["speed"], "trajectory": {"every": 30.0, "of": ["speed"]}})
+SPOILED: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "cut": (_cut, "is damaged"),
+    "emptied": (lambda path: path.write_bytes(b""), "is no file of a sweep, or cut"),
+    "flipped": (_flip, "is damaged"),
+    "copied over": (_copy_over, "is chunk 1 of the (runs|trajectories), under another name"),
+    "tampered with": (_tamper, "is damaged"),
+    "foreign": (_other_study, r"another sweep \(study differ\)"),
+    "gone": (Path.unlink, "is missing|1 of 2 chunks are there"),
+}
+
+
+@pytest.mark.parametrize("how", SPOILED)
+@pytest.mark.parametrize("what", ["runs", "trajectories"])
+def test_a_spoiled_chunk_is_named_and_made_anew(how: str, what: str, tmp_path: Path) -> None:
+    spoil, why = SPOILED[how]
+    sweep(KEPT, engine="batch", workers=1, output=tmp_path)
+    whole = [load(tmp_path, each) for each in ("runs", "trajectories")]
+    spoil(tmp_path / what / "00000.parquet")
+    with pytest.raises(ValueError, match=why):
+        load(tmp_path, what)
+    outcome = sweep(KEPT, engine="batch", workers=1, output=tmp_path)
+    assert outcome.new == 3
+    if (how, what) != ("gone", "runs"):
+        (named,) = outcome.spoiled
+        assert re.search(f"{what}/00000.parquet: .*({why})", named)
+    assert [load(tmp_path, each) for each in ("runs", "trajectories")] == whole
+
+
+def test_a_file_that_is_no_chunk_is_refused(tmp_path: Path) -> None:
+    sweep(MASSES, engine="batch", workers=1, output=tmp_path)
+    (tmp_path / "runs" / "mine.parquet").touch()
+    for use in (load, lambda folder: sweep(MASSES, engine="batch", workers=1, output=folder)):
+        with pytest.raises(ValueError, match=r"mine\.parquet: is none of a sweep's files: move it elsewhere"):
+            use(tmp_path)
+
+
+def test_two_sweeps_cannot_share_a_folder(tmp_path: Path) -> None:
+    """Nor can the same one be made twice at a time; a killed one leaves no lock."""
+
+    def try_another(_: int) -> None:
+        for study in (MASSES, but(set={})):
+            with pytest.raises(ValueError, match="another sweep is at work here"):
+                sweep(study, engine="batch", workers=1, output=tmp_path)
+
+    sweep(MASSES, engine="batch", workers=1, output=tmp_path, tell=try_another)
+    code = f"""
+import os, signal
+from hovercraft_fmu.sweep import sweep
+sweep({MASSES}, engine="batch", workers=1, output={str(tmp_path / "killed")!r},
+      tell=lambda runs: os.kill(os.getpid(), signal.SIGKILL) if runs else None)
+"""
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == -signal.SIGKILL
+    assert sweep(MASSES, engine="batch", workers=1, output=tmp_path / "killed").new == 3
+
+
+@pytest.mark.parametrize("name", ["..", "a b", "ä", ".hidden", "a/b"])
+def test_a_study_that_names_no_folder_is_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match="must be letters, digits, _, - and dots between them"):
+        sweep(replace(read_study(MASSES), name=name), engine="batch", workers=1)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("keep", "column"),
+    [
+        ({"end": ["speed"], "events": {"end": {"of": "speed", "above": 0.1, "values": ["speed"]}}}, "end.speed"),
+        ({"maximum": ["speed"], "events": {"maximum": {"of": "speed", "above": 0.1, "values": ["speed"]}}},
+         "maximum.speed"),
+    ],
+)  # fmt: skip
+def test_a_column_is_there_once(keep: dict[str, Any], column: str) -> None:
+    with pytest.raises(ValueError, match=f"keep: the column {column} must be there once"):
+        read_study(but(keep=keep))
 
 
 def test_a_sweep_goes_on_only_as_it_began(fmu: Path, native_fmu: Path, tmp_path: Path) -> None:
@@ -649,6 +754,58 @@ def test_a_worker_that_is_killed_is_an_error_and_what_was_made_stays(native_fmu:
         sweep(study, native_fmu, workers=2, output=tmp_path, tell=kill)
     made = len(list((tmp_path / "runs").glob("*.parquet")))
     assert sweep(study, native_fmu, workers=1, output=tmp_path).new == 32 - made < 32
+
+
+@pytest.fixture(scope="session")
+def identities(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Path]]:
+    """A certificate, signed by itself, and its key: ours, and a stranger's."""
+    openssl = shutil.which("openssl")
+    if not openssl:
+        pytest.skip("no openssl: apt-get install openssl")
+    folder = tmp_path_factory.mktemp("identities")
+    made: dict[str, tuple[Path, Path]] = {}
+    for name in ("ours", "stranger"):
+        cert, key = folder / f"{name}.pem", folder / f"{name}.key"
+        command = [openssl, "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+                   "-subj", f"/CN={name}", "-keyout", str(key), "-out", str(cert)]  # fmt: skip
+        subprocess.run(command, check=True, capture_output=True)
+        made[name] = cert, key
+    return made
+
+
+@pytest.mark.once
+def test_a_cluster_lets_in_who_has_the_key(
+    identities: dict[str, tuple[Path, Path]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Over TLS; without it whoever reaches a scheduler runs code there."""
+    import distributed
+
+    ours = identities["ours"][0], *identities["ours"]
+    names = [f"tls_{who}_{what}" for who in ("client", "scheduler", "worker") for what in ("cert", "key")]
+    security = distributed.Security(
+        tls_ca_file=str(ours[0]), require_encryption=True, **dict(zip(names, map(str, ours[1:] * 3), strict=True))
+    )
+    monkeypatch.setattr(cluster, "CONNECT", 1.0)
+    here = {"n_workers": 1, "threads_per_worker": 1, "host": "127.0.0.1", "processes": False}
+    with distributed.LocalCluster(**here, security=security, protocol="tls://", dashboard_address=None) as there:
+        address = there.scheduler_address
+        outcome = sweep(MASSES, engine="batch", scheduler=address, tls=ours, output=tmp_path / "ours")
+        assert outcome.new == 6
+        strange = ours[0], *identities["stranger"]
+        with pytest.raises(OSError, match="must be there, and let in who has this certificate"):
+            sweep(MASSES, engine="batch", scheduler=address, tls=strange, output=tmp_path / "strangers")
+        plain = address.replace("tls://", "tcp://")
+        with pytest.raises(OSError, match="must be there"):
+            sweep(MASSES, engine="batch", scheduler=plain, output=tmp_path / "no one's")
+    refused: list[tuple[Any, str, str]] = [
+        ((ours[0], None, None), address, "must be given all three"),
+        ((None, None, None), address, "must be given all three for tls://"),
+        (ours, "tcp://127.0.0.1:1", "must be as tls://"),
+        ((*ours[:2], strange[2]), address, "must be PEM files of one identity"),
+    ]
+    for tls, scheduler, message in refused:
+        with pytest.raises(ValueError, match=message):
+            sweep(MASSES, engine="batch", scheduler=scheduler, tls=tls, output=tmp_path / "bad")
 
 
 def test_a_scheduler_that_is_not_there(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

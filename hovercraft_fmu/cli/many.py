@@ -44,7 +44,12 @@ def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 
 @click.option("--engine", metavar="NAME", default="fmu", show_default=True,
               help="fmu, or batch: the compiled kernel, all craft at once, with the native FMU's bits.")  # fmt: skip
 @click.option("--workers", type=int, metavar="N", help="Processes on this machine. Default: one a processor.")
-@click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tcp://10.0.0.1:8786.")
+@click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, as tls://10.0.0.1:8786.")
+@click.option(
+    "--tls-ca", type=PathOf(path_type=Path), metavar="FILE.pem", help="Who signed the scheduler's certificate."
+)
+@click.option("--tls-cert", type=PathOf(path_type=Path), metavar="FILE.pem", help="Your certificate.")
+@click.option("--tls-key", type=PathOf(path_type=Path), metavar="FILE.pem", help="Its key.")
 @click.option(
     "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR",
     help="Default: build/sweep/ and the study.",
@@ -57,6 +62,9 @@ def sweep(
     output: Path | None,
     plot: Path | None,
     engine: str,
+    tls_ca: Path | None,
+    tls_cert: Path | None,
+    tls_key: Path | None,
     **options: Any,
 ) -> None:
     """Make many runs of one FMU, in parallel, into Parquet files.
@@ -76,9 +84,12 @@ def sweep(
     path = named_fmu(fmu, kind) if engine == "fmu" or kind else fmu
     begun = perf_counter()
     with progress_of(chosen.runs, "sweeping", MofNCompleteColumn(), _Rate()) as tell:
-        outcome = sweep(chosen, path, engine=engine, output=output, tell=tell, **options)
+        tls = tls_ca, tls_cert, tls_key
+        outcome = sweep(chosen, path, engine=engine, output=output, tell=tell, tls=tls, **options)
     seconds = perf_counter() - begun
     OUTPUT.print(f"{outcome.folder}: {outcome.runs} runs, {outcome.new} of them made now in {seconds:.1f} s")
+    for line in outcome.spoiled:
+        OUTPUT.print(f"set aside, made anew: {line}")
     if outcome.error:
         OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}")
     if outcome.warned:

@@ -1,11 +1,14 @@
 """Chunks are made on a cluster of dask's."""
 
+import ssl
 from collections.abc import Generator
 from itertools import islice
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import distributed
 from distributed.comm.addressing import get_address_host_port
+from distributed.security import Security
 
 from ..host import SimulationError
 from .work import Job, Made, make_chunk, release
@@ -17,26 +20,64 @@ AHEAD = 2
 """Chunks a worker that are on their way: memory here and there stays bounded."""
 
 
-def made_on(scheduler: str, job: Job, todo: Todo) -> Generator[Made, None, None]:
+class Scheduler(NamedTuple):
+    """Where it is, and what it takes to be let in; without the files whoever reaches it can run code there."""
+
+    address: str
+    ca: Path | None = None
+    """PEM: who has signed the scheduler's certificate"""
+    cert: Path | None = None
+    """PEM: one's own certificate"""
+    key: Path | None = None
+    """PEM: its key"""
+
+
+def made_on(scheduler: Scheduler, job: Job, todo: Todo) -> Generator[Made, None, None]:
     """As they are made.
 
     Raises:
-        ValueError: what is no address; a scheduler without a worker.
+        ValueError: what is no address; files for TLS that do not fit; a scheduler without a worker.
         OSError: a scheduler that cannot be reached.
         SimulationError: the workers are gone.
     """
     with _connected(scheduler) as client:
         if not client.nthreads():
-            raise ValueError(f"scheduler = {scheduler!r}: must have a worker")
+            raise ValueError(f"scheduler = {scheduler.address!r}: must have a worker")
         yield from _on(client, job, todo)
 
 
-def _connected(scheduler: str) -> Any:
+def _connected(scheduler: Scheduler) -> Any:
+    address = scheduler.address
     try:
-        get_address_host_port(scheduler)  # a client that was made with a bad one lingers, and then complains
+        get_address_host_port(address)  # a client that was made with a bad one lingers, and then complains
     except ValueError as error:
-        raise ValueError(f"scheduler = {scheduler!r}: must be an address as tcp://10.0.0.1:8786; {error}") from error
-    return distributed.Client(scheduler, set_as_default=False, timeout=CONNECT)
+        raise ValueError(f"scheduler = {address!r}: must be an address as tcp://10.0.0.1:8786; {error}") from error
+    security = _security(scheduler)
+    try:
+        return distributed.Client(address, set_as_default=False, timeout=CONNECT, security=security)
+    except OSError as error:
+        let_in = ", and let in who has this certificate" if security else ""
+        raise OSError(f"scheduler = {address!r}: must be there{let_in}; {error}") from error
+
+
+def _security(scheduler: Scheduler) -> Security | None:
+    files = {"tls_ca_file": scheduler.ca, "tls_client_cert": scheduler.cert, "tls_client_key": scheduler.key}
+    given = [path for path in files.values() if path]
+    encrypted = scheduler.address.startswith("tls://")
+    if not given and not encrypted:
+        return None
+    if len(given) < len(files):
+        raise ValueError("tls_ca, tls_cert, tls_key: must be given all three for tls://, or none")
+    if not encrypted:
+        raise ValueError(f"scheduler = {scheduler.address!r}: must be as tls://10.0.0.1:8786 to be encrypted")
+    for path in given:
+        path.read_bytes()  # it says which one cannot be read
+    security = Security(require_encryption=True, **{name: str(path) for name, path in files.items()})
+    try:
+        security.get_connection_args("client")
+    except ssl.SSLError as error:
+        raise ValueError(f"{', '.join(map(str, given))}: must be PEM files of one identity; {error}") from error
+    return security
 
 
 def _on(client: Any, job: Job, todo: Todo) -> Generator[Made, None, None]:

@@ -3,10 +3,12 @@
 import hashlib
 import os
 import platform
+import re
 import uuid
 from collections.abc import Callable, Generator, Mapping
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -21,7 +23,7 @@ from ..host import read_description
 from ..model.error_estimate import ON
 from ..simulation.fmu_run import own_starts
 from .engines import SETTINGS, Plan
-from .store import Store
+from .store import RUNS, TRAJECTORIES, Store, store
 from .study import Study, read_study
 from .timeline import timeline
 from .work import Job, Made
@@ -36,6 +38,7 @@ MOST_RUNS = {FMU: 500, BATCH: 8000}
 """In a chunk: what a killed sweep makes anew, at most, for each worker."""
 LEAST_CHUNKS = {FMU: 32, BATCH: 2}
 """So that there is work for some workers."""
+FOLDER_NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 MOST_VALUES = 2**22
 """That a chunk reads (32 MB): so memory stays bounded where whole trajectories are read."""
 MOST_SUBSTEPS = 10**6
@@ -55,6 +58,8 @@ class Outcome(NamedTuple):
     """Of the new ones: rows whose column `warnings` is not 0."""
     error: str | None
     """The first of the errors, with the number of its run."""
+    spoiled: tuple[str, ...]
+    """Files that were damaged, misplaced or of another sweep, and why: set aside and made anew."""
 
 
 @explains_keywords
@@ -65,6 +70,7 @@ def sweep(
     engine: str = FMU,
     workers: int | None = None,
     scheduler: str | None = None,
+    tls: tuple[Path | None, Path | None, Path | None] = (None, None, None),
     output: str | os.PathLike[str] | None = None,
     tell: Tell = lambda _: None,
 ) -> Outcome:
@@ -79,47 +85,68 @@ def sweep(
         engine: fmu, or batch: the compiled kernel, all craft at once, with the bits of the native FMU.
         workers: processes on this machine; by default one a processor. 1: this process.
         scheduler: address of a dask.distributed scheduler, as tcp://10.0.0.1:8786, whose workers have this package.
+        tls: PEM files to reach a scheduler by tls://: the authority's certificate, one's own, its key.
         output: folder of the results; by default build/sweep/ and the name of the study.
         tell: see `Tell`.
 
     Raises:
-        ValueError: a bad study, FMU or argument; a folder with the results of another sweep.
+        ValueError: a bad study, FMU or argument; a folder with the results of another sweep, or one at work in it.
         OSError: a file that cannot be read or written, a scheduler that cannot be reached.
     """
     chosen = study if isinstance(study, Study) else read_study(study)
     job, about = _job(chosen, fmu, engine)
     if workers is not None and workers < 1:
         raise ValueError(f"workers = {workers}: must be at least 1")
-    store = Store(Path(output) if output else Path("build") / "sweep" / chosen.name, about)
-    size, done = about["chunk"], store.done
-    chunks = range(-(-chosen.runs // size))
-    there = sum(len(_numbers(number, size, chosen.runs)) for number in done)
-    left = ((number, _numbers(number, size, chosen.runs)) for number in chunks if number not in done)
-    todo = ((number, numbers, chosen.samples(numbers)) for number, numbers in left)
+    with store(Path(output) if output else default_folder(chosen.name), about) as there:
+        return _made(chosen, there, job, partial(_chunks, workers=workers, scheduler=scheduler, tls=tls), tell)
+
+
+def _made(
+    study: Study, there: Store, job: Job, make: Callable[..., Generator[Made, None, None]], tell: Tell
+) -> Outcome:
+    size, done = job.about["chunk"], there.done
+    chunks = range(-(-study.runs // size))
+    had = sum(len(_numbers(number, size, study.runs)) for number in done)
+    left = ((number, _numbers(number, size, study.runs)) for number in chunks if number not in done)
+    todo = ((number, numbers, study.samples(numbers)) for number, numbers in left)
     new = failed = warned = 0
     first: tuple[int, str] | None = None
-    tell(there)
-    if there < chosen.runs:
-        with closing(_chunks(job, todo, workers, scheduler)) as chunks_made:
+    tell(had)
+    if had < study.runs:
+        with closing(make(job, todo)) as chunks_made:
             for made in chunks_made:
-                store.write(made.chunk, made.files)
+                there.write(made.chunk, made.files)
                 new, failed, warned = new + made.runs, failed + made.failed, warned + made.warned
                 first = min(filter(None, (first, made.error)), default=None)
-                tell(there + new)
+                tell(had + new)
     error = "run {}: {}".format(*first) if first else None
-    return Outcome(store.folder, chosen.runs, new, failed, warned, error)
+    return Outcome(there.folder, study.runs, new, failed, warned, error, tuple(there.spoiled))
 
 
-def _chunks(job: Job, todo: Todo, workers: int | None, scheduler: str | None) -> Generator[Made, None, None]:
+def default_folder(name: str) -> Path:
+    """Of a study's results. Raises ValueError where its name is none of a folder that every system has."""
+    if not FOLDER_NAME.fullmatch(name):
+        raise ValueError(
+            f"study = {name!r}: must be letters, digits, _, - and dots between them to name the folder of the results; "
+            "or name one as output"
+        )
+    return Path("build") / "sweep" / name
+
+
+def _chunks(
+    job: Job, todo: Todo, workers: int | None, scheduler: str | None, tls: tuple[Path | None, ...]
+) -> Generator[Made, None, None]:
     """Made where they are to be made."""
     if scheduler is None:
+        if any(tls):
+            raise ValueError("tls_ca, tls_cert, tls_key: must be given with a scheduler: workers here need no port")
         count = workers or _processors()
         return made_here(job, todo) if count == 1 else made_beside(job, todo, count)
     if workers is not None:
         raise ValueError(f"workers = {workers}: must not be given with a scheduler, which has its own")
-    from .cluster import made_on
+    from .cluster import Scheduler, made_on
 
-    return made_on(scheduler, job, todo)
+    return made_on(Scheduler(scheduler, *tls), job, todo)
 
 
 def _processors() -> int:
@@ -150,6 +177,7 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
     plan = Plan(study.run, study.keep, timeline(study.run, study.keep))
     about = {
         "study": study.content,
+        "study_sha256": hashlib.sha256(study.content.encode()).hexdigest(),
         "engine": engine,
         "fmu_sha256": hashlib.sha256(content).hexdigest() if content else None,
         "hovercraft_fmu": __version__,
@@ -158,6 +186,7 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
         "name": study.name,
         "swept": list(swept),
         "kept": list(study.keep.columns),
+        "files": [RUNS, TRAJECTORIES] if study.keep.trajectory else [RUNS],
         "versions": {
             "python": platform.python_version(), "numpy": metadata.version("numpy"), "scipy": metadata.version("scipy"),
             "pyarrow": metadata.version("pyarrow"), "dask": metadata.version("dask"),

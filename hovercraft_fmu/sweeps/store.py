@@ -1,85 +1,160 @@
-"""Where a sweep's results are: a folder of Parquet files, one a chunk of runs, each written whole or not at all."""
+"""Where a sweep's results are: a folder of Parquet files, one a chunk of runs, each written whole or not at all.
 
+Every file says which sweep it is of, which chunk it is, how many rows it has, and the SHA-256 of all its bytes.
+"""
+
+import hashlib
+import io
 import json
 import os
-from collections.abc import Mapping
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from ..whole import written
 from .quantities import display
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
 
 RUNS, TRAJECTORIES = "runs", "trajectories"
 KEY = b"hovercraft_fmu"
 """Of the metadata: JSON; see `packed`."""
 SAME = ("study", "engine", "fmu_sha256", "hovercraft_fmu", "runs", "chunk")
 """What must be the same where a sweep goes on; the rest of the metadata may differ."""
+OF_ONE_FILE = ("what", "number", "rows", "sha256")
+"""What the metadata of one file alone has."""
+NAME = re.compile(r"\d{5,}")
+BLANK = b"0" * 64
+SEAL = re.compile(rb'"sha256": "([0-9a-f]{64})"')
 
 
 class Store:
     """The folder of one sweep: runs/00000.parquet, ..., and trajectories/ where they are kept.
 
     Raises:
-        ValueError: the folder holds another sweep's results.
+        ValueError: the folder holds another sweep's results, or other files.
+        OSError: it cannot be read or written.
     """
 
-    def __init__(self, folder: Path, metadata: Mapping[str, Any]) -> None:
+    def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
         self.folder = folder
-        for path in self._files():
-            _check_same(folder, metadata_of(path), metadata)
-
-    @property
-    def done(self) -> set[int]:
+        self.done: set[int] = set()
         """The numbers of the chunks that are there."""
-        return {int(path.stem) for path in self._files()}
-
-    def _files(self) -> list[Path]:
-        return sorted((self.folder / RUNS).glob("*.parquet"))
+        self.spoiled: list[str] = []
+        """What was set aside, and why: it must be made anew."""
+        wrong: dict[Path, str] = {}
+        for path in _files(folder, RUNS):
+            whole = [folder / what / path.name for what in about["files"]]
+            found = {each: why for each in whole if (why := _wrong(each, about))}
+            wrong |= found
+            if not found:
+                self.done.add(int(path.stem))
+        another = [why for why in wrong.values() if why.startswith(ANOTHER)]
+        if another and not self.done:
+            raise ValueError(
+                f"{folder}: holds the results of {another[0]}: name another folder as output, or delete it"
+            )
+        for path, why in wrong.items():
+            if path.exists():
+                path.replace(path.with_name(f".{path.name}.spoiled"))
+            self.spoiled.append(f"{path}: {why}")
 
     def write(self, chunk: int, files: Mapping[str, bytes]) -> None:
         """Write the files of a chunk; see `packed`. Its runs come last: where they are, all of it is."""
         for what in sorted(files, key=lambda what: what == RUNS):
-            self._write(what, chunk, files[what])
-
-    def _write(self, what: str, chunk: int, content: bytes) -> None:
-        path = self.folder / what / f"{chunk:05}.parquet"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-        try:
-            with unfinished.open("wb") as file:
-                file.write(content)
+            with written(self.folder / what / f"{chunk:05}.parquet") as path, path.open("wb") as file:
+                file.write(files[what])
                 file.flush()
                 os.fsync(file.fileno())
-            unfinished.replace(path)
-        finally:
-            unfinished.unlink(missing_ok=True)
 
 
-def metadata_of(path: Path) -> dict[str, Any]:
-    """The metadata of one file. Raises ValueError where it is not one of a sweep."""
+@contextmanager
+def store(folder: Path, about: Mapping[str, Any]) -> Iterator[Store]:
+    """The store, for this process alone. Raises as `Store` does; ValueError: another process has it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / ".lock").open("a+b") as lock:  # the system lets go of it when the process ends, however it does
+        _take(lock, folder)
+        for left in folder.glob("*/.*.parquet.*[0-9]"):  # of one that was killed
+            left.unlink()
+        yield Store(folder, about)
+
+
+def _take(lock: IO[bytes], folder: Path) -> None:
     try:
-        return dict(json.loads(pq.read_schema(path).metadata[KEY]))
-    except (pa.ArrowInvalid, TypeError, KeyError) as error:
-        raise ValueError(f"{path}: must be a Parquet file of a sweep; {error!r}") from error
+        if sys.platform == "win32":
+            lock.seek(0)
+            msvcrt.locking(lock.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError) as error:
+        raise ValueError(f"{folder}: another sweep is at work here: wait for it, or name another folder") from error
 
 
-def _check_same(folder: Path, there: Mapping[str, Any], here: Mapping[str, Any]) -> None:
-    different = [name for name in SAME if there.get(name) != here.get(name)]
-    if different:
-        raise ValueError(
-            f"{folder}: holds the results of another sweep ({', '.join(different)} differ): name another folder as "
-            "output, or delete it"
-        )
+# ---- what is there
+
+
+ANOTHER = "another sweep ("
+
+
+def _files(folder: Path, what: str) -> list[Path]:
+    """Raises ValueError where there are others."""
+    found = sorted(path for path in (folder / what).glob("*.parquet") if not path.name.startswith("."))
+    for path in found:
+        if not NAME.fullmatch(path.stem):
+            raise ValueError(f"{path}: is none of a sweep's files: move it elsewhere")
+    return found
+
+
+def _wrong(path: Path, about: Mapping[str, Any]) -> str:
+    """Why a file is none of that sweep; '' where it is right."""
+    try:
+        there, _ = _opened(path)
+    except FileNotFoundError:
+        return "is missing"
+    except ValueError as error:
+        return str(error)
+    return _different(there, about) or _misplaced(path, there)
+
+
+def _different(there: Mapping[str, Any], about: Mapping[str, Any]) -> str:
+    different = [name for name in SAME if there.get(name) != about.get(name)]
+    return f"{ANOTHER}{', '.join(different)} differ)" if different else ""
+
+
+def _misplaced(path: Path, there: Mapping[str, Any]) -> str:
+    if (there["what"], f"{there['number']:05}") != (path.parent.name, path.stem):
+        return f"is chunk {there['number']} of the {there['what']}, under another name"
+    return ""
+
+
+def _opened(path: Path) -> tuple[dict[str, Any], bytes]:
+    """The metadata and the content of a file that is as it was written. Raises ValueError: it is not."""
+    content = path.read_bytes()
+    seals = set(SEAL.findall(content))
+    if len(seals) != 1:
+        raise ValueError("is no file of a sweep, or cut: it has no checksum")
+    (seal,) = seals
+    if hashlib.sha256(content.replace(seal, BLANK)).hexdigest().encode() != seal:
+        raise ValueError("is damaged: its checksum is another one")
+    about = dict(json.loads(pq.read_schema(pa.BufferReader(content)).metadata[KEY]))
+    return about, content
 
 
 def load(folder: str | os.PathLike[str], what: str = RUNS) -> pa.Table:
     """The results of a finished sweep: a row a run, in their order; or the trajectories, a row a point of time.
 
-    The metadata is that of the first file: the study, versions, the FMU's SHA-256, as JSON. A file alone, or what is
+    The metadata is what all files share: the study, versions, the FMU's SHA-256, as JSON. A file alone, or what is
     there of a sweep that was ended, is plain Parquet: pandas.read_parquet(folder / "runs").
 
     Args:
@@ -88,24 +163,41 @@ def load(folder: str | os.PathLike[str], what: str = RUNS) -> pa.Table:
 
     Raises:
         FileNotFoundError: there is no sweep.
-        ValueError: it is not finished; or it kept no trajectories.
+        ValueError: it is not finished; a file is damaged or of another sweep; it kept no trajectories.
     """
     if what not in (RUNS, TRAJECTORIES):
         raise ValueError(f"what = {what!r}: must be one of {RUNS}, {TRAJECTORIES}")
     folder = Path(folder)
-    files = sorted((folder / RUNS).glob("*.parquet"))
+    files = _files(folder, RUNS)
     if not files:
         raise FileNotFoundError(f"{folder}: no sweep is there")
-    metadata = metadata_of(files[0])
-    chunks = -(-metadata["runs"] // metadata["chunk"])
+    about = _checked(files[0], {})[0]
+    chunks = -(-about["runs"] // about["chunk"])
     if len(files) != chunks:
         raise ValueError(f"{folder}: {len(files)} of {chunks} chunks are there: finish it with the same command")
-    if what == TRAJECTORIES:
-        files = sorted((folder / TRAJECTORIES).glob("*.parquet"))
-        if not files:
-            raise ValueError(f"{folder}: the sweep kept no trajectories")
-    tables = [pq.read_table(path).replace_schema_metadata(None) for path in files]
-    return pa.concat_tables(tables).replace_schema_metadata({KEY: json.dumps(metadata)})
+    if what not in about["files"]:
+        raise ValueError(f"{folder}: the sweep kept no trajectories")
+    tables = []
+    for path in files:
+        there, content = _checked(folder / what / path.name, about)
+        tables.append(pq.read_table(io.BytesIO(content)).replace_schema_metadata(None))
+        assert tables[-1].num_rows == there["rows"]
+    shared = {name: value for name, value in about.items() if name not in OF_ONE_FILE}
+    return pa.concat_tables(tables).replace_schema_metadata({KEY: json.dumps(shared)})
+
+
+def _checked(path: Path, about: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
+    """The metadata and the content. Raises ValueError where it is damaged, elsewhere, or of another sweep."""
+    with suppress(FileNotFoundError):
+        try:
+            there, content = _opened(path)
+            why = (_different(there, about) if about else "") or _misplaced(path, there)
+        except ValueError as error:
+            why = str(error)
+        if not why:
+            return there, content
+        raise ValueError(f"{path}: {why}; the same command makes it anew")
+    raise ValueError(f"{path}: is missing; the same command makes it anew")
 
 
 class Extreme(NamedTuple):
@@ -141,13 +233,14 @@ def extremes(folder: str | os.PathLike[str]) -> list[Extreme]:
 # ---- tables
 
 
-def packed(table: pa.Table, metadata: Mapping[str, Any]) -> bytes:
-    """The content of a Parquet file that says where its rows come from."""
+def packed(table: pa.Table, about: Mapping[str, Any], what: str, number: int) -> bytes:
+    """The content of a Parquet file that says where its rows come from, and what it is of the sweep."""
     into = pa.BufferOutputStream()
+    own = dict(zip(OF_ONE_FILE, (what, number, table.num_rows, BLANK.decode()), strict=True))
     # a dictionary of numbers that are all different takes time and room
-    pq.write_table(table.replace_schema_metadata({KEY: json.dumps(metadata)}), into, use_dictionary=False)
+    pq.write_table(table.replace_schema_metadata({KEY: json.dumps({**about, **own})}), into, use_dictionary=False)
     content: bytes = into.getvalue().to_pybytes()
-    return content
+    return content.replace(BLANK, hashlib.sha256(content).hexdigest().encode())
 
 
 def runs_table(

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import prod
@@ -171,9 +172,19 @@ def _study(table: Mapping[str, Any], name: str, folder: Path) -> Study:
     right = tuple(factor for factor in factors if factor)
     sampled = mistakes.tried(_sampled, sampling, right) if sampling is not None and right else None
     keep = mistakes.tried(_keep, kept, run) if kept is not None else None
+    if keep:
+        mistakes += _same_columns((factor.name for factor in right), keep)
     if mistakes or not (source and run and sampled and keep):
         raise MistakesError(mistakes)
     return Study(name, run, right, keep, *sampled, _content(table, source.log))
+
+
+def _same_columns(swept: Iterable[str], keep: Keep) -> list[str]:
+    """A column that is there twice would be one of the two."""
+    names = Counter(("run", *swept, *keep.columns, "warnings", "error"))
+    return [
+        f"keep: the column {name} must be there once: name the event otherwise" for name in names if names[name] > 1
+    ]
 
 
 class _Source(NamedTuple):

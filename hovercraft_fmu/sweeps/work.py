@@ -56,23 +56,23 @@ def make_chunk(job: Job, chunk: int, numbers: NDArray[np.int64], samples: Sample
     ran = run_batch(job.plan, samples) if job.fmu is None else _driver(job).run(samples)
     errors = [(int(number), error) for number, error in zip(numbers, ran.errors, strict=True) if error is not None]
     warned = int(np.count_nonzero(ran.warnings))
-    return Made(chunk, _files(job, numbers, samples, ran), len(numbers), len(errors), warned, min(errors, default=None))
+    return Made(
+        chunk, _files(job, chunk, numbers, samples, ran), len(numbers), len(errors), warned, min(errors, default=None)
+    )
 
 
-def _files(job: Job, numbers: NDArray[np.int64], samples: Samples, ran: Ran) -> dict[str, bytes]:
+def _files(job: Job, chunk: int, numbers: NDArray[np.int64], samples: Samples, ran: Ran) -> dict[str, bytes]:
     keep, timeline = job.plan.keep, job.plan.timeline
     columns = row_columns(keep, ran.record, timeline.times)
-    runs = packed(runs_table(numbers, samples, columns, ran.warnings, ran.errors), job.about)
+    runs = packed(runs_table(numbers, samples, columns, ran.warnings, ran.errors), job.about, RUNS, chunk)
     if not keep.trajectory:
         return {RUNS: runs}
     good = np.array([error is None for error in ran.errors])
     values = quantity_function(keep, ran.record)
     points = timeline.sampled
     kept = {name: values(name)[np.ix_(good, points)] for name in keep.trajectory}
-    return {
-        RUNS: runs,
-        TRAJECTORIES: packed(trajectories_table(numbers[good], timeline.times[points], kept), job.about),
-    }
+    paths = trajectories_table(numbers[good], timeline.times[points], kept)
+    return {RUNS: runs, TRAJECTORIES: packed(paths, job.about, TRAJECTORIES, chunk)}
 
 
 def _driver(job: Job) -> Driver:
