@@ -4,7 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -12,10 +12,10 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-from hovercraft_fmu import advance_fleet
+from hovercraft_fmu import advance_fleet, build
 from hovercraft_fmu.autopilot.pilot_package import build_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
-from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all
+from hovercraft_fmu.fmu.machine_code import BROWSER, TARGETS, NotCompiledError, compile_all
 from hovercraft_fmu.fmu.native_package import build_native_fmu
 from hovercraft_fmu.fmu.python_package import build_fmu
 from hovercraft_fmu.model.craft import Craft
@@ -67,11 +67,13 @@ def _native(flavour: Flavour, variable: str, built: Built) -> Path:
     return _compiled(flavour, f"{flavour.identifier}.fmu", built, HERE[sys.platform])
 
 
-def _compiled(flavour: Flavour, name: str, built: Built, platforms: Iterable[str]) -> Path:
+def _compiled(flavour: Flavour, name: str, built: Built, platforms: Collection[str]) -> Path:
     """A native FMU; C that was changed since it was compiled is compiled again, where the compiler is installed."""
 
     def make(path: Path) -> Path:
         compile_all(platforms)
+        if BROWSER in platforms:  # as the package builds it
+            return build("native" if flavour is NATIVE else "native3", path)
         return build_native_fmu(path, flavour, platforms)
 
     try:
@@ -112,7 +114,7 @@ def native3_fmu(built: Built) -> Path:
 def complete_native_fmu(standard: int, built: Built) -> Path:
     """The native FMU of FMI 2.0, then that of FMI 3.0, for every platform."""
     flavour = NATIVE if standard == 2 else NATIVE3
-    return _compiled(flavour, f"{flavour.identifier}Complete.fmu", built, PLATFORMS)
+    return _compiled(flavour, f"{flavour.identifier}Complete.fmu", built, TARGETS)
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,8 @@ from ..fmu.native_package import build_native_fmu
 from ..fmu.near_names import explains_keywords, must_be_one_of
 from ..fmu.python_package import build_fmu, hovercraft_content, python_identity
 from ..fmu.start_values import Value, variant
+from ..view.page import FILE as PAGE
+from ..view.page import page
 from ..whole import temporary_folder
 from .ssp import build_ssp
 
@@ -46,7 +48,9 @@ LOOPS: Mapping[str, str] = MappingProxyType({f"{kind}_loop": kind for kind in FL
 
 
 def _craft(flavour: Flavour) -> Callable[[Path], Path]:
-    return lambda path: (build_native_fmu if flavour.parts else build_fmu)(path, flavour)
+    if not flavour.parts:
+        return lambda path: build_fmu(path, flavour)
+    return lambda path: build_native_fmu(path, flavour, more={PAGE: page(flavour)})
 
 
 def _loop(flavour: Flavour) -> Product:

@@ -49,6 +49,7 @@ def commands(context: click.Context) -> None:
       hovercraft-fmu demo                          build, check and drive it; see build/demo/
       hovercraft-fmu demo --loop                   the same with an autopilot at the helm
       hovercraft-fmu build                         write the FMUs and the SSP files into build/
+      hovercraft-fmu play                          the arrow keys, in a browser
       hovercraft-fmu drive                         the arrow keys, in a window
       hovercraft-fmu simulate --scene turn --plot turn.png
       hovercraft-fmu simulate --help               what can be set
@@ -59,6 +60,7 @@ def commands(context: click.Context) -> None:
 
 for each in (
     files.build,
+    files.play,
     running.simulate,
     running.advise,
     running.drive,

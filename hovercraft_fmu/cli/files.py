@@ -1,4 +1,4 @@
-"""The commands that write and check files: build, validate, cross-check."""
+"""The commands that write and check files: build, play, validate, cross-check."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,6 +48,27 @@ def build(
     reasons = {each.name: _written(each, output / each.name) for each in wanted}
     if missing := [name for name, reason in reasons.items() if reason]:
         raise click.ClickException(f"not written: {', '.join(missing)}; {reasons[missing[0]]}")
+
+
+@click.command()
+@click.option(
+    "--output", type=PathOf(path_type=Path), metavar="FILE.html", default=FOLDER / "play.html", show_default=True
+)
+@click.option("--no-open", is_flag=True, help="Write the page, and leave the browser alone.")
+def play(output: Path, no_open: bool) -> None:
+    """Drive the FMU in the browser: write the page that carries it, and open it.
+
+    It is one file that needs no network; the native FMUs have it in documentation/play.html.
+    """
+    import webbrowser
+
+    from ..fmu.archive import write_archive
+    from ..view.page import page
+
+    path = write_archive(output, page, ".html")
+    OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, to be opened in any browser")
+    if not no_open and not webbrowser.open(path.resolve().as_uri()):
+        OUTPUT.print("no browser could be started here")
 
 
 def _written(chosen: "Product", path: Path) -> str:

@@ -3,7 +3,7 @@
 Those of measurements, results.html and sweeps.html with their pictures, are there as `studies/pages.py` wrote them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +26,12 @@ CHECKED: Mapping[str, str] = {
 """What `hovercraft-fmu validate --table` printed for each FMU."""
 
 
-def pages(flavour: Flavour = PYTHON) -> dict[str, str]:
-    """Path inside the documentation -> the whole page, for one of the hovercraft's FMUs."""
+def pages(flavour: Flavour = PYTHON, more: Iterable[str] = ()) -> dict[str, str]:
+    """Path inside the documentation -> the whole page, for one of the hovercraft's FMUs; beside them are `more`."""
     ordinary = flavour.variant_of or flavour
     values = {
         "native": bool(flavour.parts),
+        "more": tuple(more),
         "flavour": flavour,
         "ordinary": ordinary,
         "exchange": bool(flavour.exchange),
@@ -54,15 +55,15 @@ def licenses(parts: str, file: str, notice: bytes) -> dict[str, bytes]:
     return {LICENSE_FILE: ours + f"\n{parts}: see {file}.\n".encode(), f"licenses/{file}": notice}
 
 
-def documents(flavour: Flavour) -> dict[str, bytes]:
-    """All of documentation/ but licences, for one of the hovercraft's FMUs: path -> content."""
+def documents(flavour: Flavour, more: Mapping[str, bytes] = {}) -> dict[str, bytes]:
+    """All of documentation/ but licences, for one of the hovercraft's FMUs: path -> content, with that of `more`."""
     static = {
         path.relative_to(FOLDER).as_posix(): path.read_bytes() for path in sorted(FOLDER.rglob("*")) if _goes(path)
     }
     del static[LICENSE_FILE]
     if flavour.parts:
         del static["externalDependencies.txt"]
-    return {**static, **{name: page.encode() for name, page in pages(flavour).items()}}
+    return {**static, **{name: page.encode() for name, page in pages(flavour, more).items()}, **more}
 
 
 def _goes(path: Path) -> bool:

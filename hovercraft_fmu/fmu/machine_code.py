@@ -1,4 +1,5 @@
-"""The machine code: the C of native/ compiled for six platforms on one machine, the same bytes wherever that is done.
+"""The machine code: the C of native/ compiled for six platforms, and for browsers, on one machine, the same bytes
+wherever that is done.
 
 The build hook (hatch_build.py) does it when the package is built, before anything else is installed: this module needs
 the standard library alone. What was compiled lies in compiled/, in folders that carry a digest of all that it was made
@@ -8,7 +9,7 @@ of, so C that was changed since finds no folder, and stale machine code is never
 import os
 import shutil
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -34,7 +35,7 @@ WHY_NOT = "why_not.txt"
 OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
 """What keeps the bits, and keeps libm out."""
 LIBRARY_OPTIONS = (
-    *("-g0", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-slp-vectorize"),
+    *("-g0", "-fvisibility=hidden", "-fno-slp-vectorize"),
     *("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX"),
 )
 """In a library the FMI functions have no prefix.
@@ -55,10 +56,15 @@ class Platform:
 
 # Without the compiler's own runtime, which would take most of the time and of which nothing is needed; the C library is
 # named, so that a loader finds it. glibc of 2012; macOS of 2020. What strips a Mach-O file would break its signature.
-_OF_LINUX = ("-s", "-nostdlib", "-lc")
-_OF_MACOS = ("-nostdlib", "-lSystem")
-# without a C runtime: nothing to install
-_OF_WINDOWS = ("-s", "-nostdlib", "-Wl,--entry=DllMain", "-DHOVERCRAFT_NO_LIBC", "-lkernel32")
+_SHARED = ("-shared", "-fPIC", "-nostdlib")
+_OF_LINUX = (*_SHARED, "-s", "-lc")
+_OF_MACOS = (*_SHARED, "-lSystem")
+# without a C runtime: nothing to install, nothing to import
+_OF_WINDOWS = (*_SHARED, "-s", "-Wl,--entry=DllMain", "-DHOVERCRAFT_NO_LIBC", "-lkernel32")
+_OF_BROWSER = (
+    *("-mexec-model=reactor", "-nostdlib", "-s", "-mbulk-memory", "-DHOVERCRAFT_NO_LIBC", "-Wl,--no-entry"),
+    *("-Wl,--export-dynamic", "-Wl,--export-table", "-Wl,--growable-table"),  # for the callback of messages
+)
 PLATFORMS: Mapping[str, Platform] = {
     "x86_64-linux": Platform("x86_64-linux-gnu.2.17", ".so", _OF_LINUX),
     "aarch64-linux": Platform("aarch64-linux-gnu.2.17", ".so", _OF_LINUX),
@@ -68,6 +74,9 @@ PLATFORMS: Mapping[str, Platform] = {
     "aarch64-darwin": Platform("aarch64-macos.11.0", ".dylib", _OF_MACOS),
 }
 """By the names of FMI 3.0."""
+BROWSER = "wasm32"
+TARGETS: Mapping[str, Platform] = {**PLATFORMS, BROWSER: Platform("wasm32-wasi", ".wasm", _OF_BROWSER)}
+"""And what is in no FMU's binaries/: the page has it."""
 
 
 class NotCompiledError(FileNotFoundError):
@@ -83,6 +92,8 @@ class Library:
     """The files to compile."""
     files: Mapping[str, bytes] = field(repr=False)
     """All that the compiler reads, by path: these and what they include."""
+    targets: tuple[str, ...] = tuple(PLATFORMS)
+    """Keys of TARGETS."""
 
     @cached_property
     def folder(self) -> Path:
@@ -92,7 +103,7 @@ class Library:
     @property
     def missing(self) -> str:
         """Why there is no machine code of it, and how to get it; '' where there is."""
-        return self._missing if any(not self.file(platform).exists() for platform in PLATFORMS) else ""
+        return self._missing if any(not self.file(target).exists() for target in self.targets) else ""
 
     @property
     def _missing(self) -> str:
@@ -109,7 +120,7 @@ class Library:
 
     def file(self, platform: str) -> Path:
         """Where the library for a platform is, once it is compiled."""
-        return self.folder / platform / f"{self.name}{PLATFORMS[platform].suffix}"
+        return self.folder / platform / f"{self.name}{TARGETS[platform].suffix}"
 
 
 def libraries() -> list[Library]:
@@ -125,7 +136,8 @@ def library(flavour: Flavour) -> Library:
         **{f"{flavour.identifier}/{name}": content for name, content in own.items()},
         **_units(flavour),
     }
-    return Library(flavour.identifier, tuple(_units(flavour)), files)
+    targets = (*PLATFORMS, BROWSER) if flavour is NATIVE3 else tuple(PLATFORMS)
+    return Library(flavour.identifier, tuple(_units(flavour)), files, targets)
 
 
 SHARED = "shared"
@@ -220,7 +232,7 @@ def identity(flavour: Flavour) -> str:
 
 
 def _made_by(compiled: Sequence[str]) -> dict[str, bytes]:
-    return {"compiler": f"{COMPILER} {OPTIONS} {LIBRARY_OPTIONS} {PLATFORMS} {compiled}".encode()}
+    return {"compiler": f"{COMPILER} {OPTIONS} {LIBRARY_OPTIONS} {TARGETS} {compiled}".encode()}
 
 
 # ---- where there is none
@@ -250,7 +262,7 @@ def compile_all(platforms: Iterable[str] | None = None) -> str:
     """Compile what is not compiled yet, and then forget what is stale; where that fails, all stays.
 
     Args:
-        platforms: keys of PLATFORMS; without them all.
+        platforms: keys of TARGETS; without them all.
 
     Returns:
         Why that failed; '' where it did not.
@@ -258,7 +270,7 @@ def compile_all(platforms: Iterable[str] | None = None) -> str:
     wanted = libraries()
     COMPILED.mkdir(exist_ok=True)
     try:
-        _compile(wanted, PLATFORMS if platforms is None else platforms)
+        _compile(wanted, TARGETS if platforms is None else tuple(platforms))
     except (OSError, subprocess.SubprocessError) as error:
         reason = " ".join(str(error).split())
         (COMPILED / WHY_NOT).write_text(reason, encoding="utf-8")
@@ -275,9 +287,10 @@ def _forget(keep: set[Path]) -> None:
             shutil.rmtree(path, ignore_errors=True)  # on Windows one that is loaded stays
 
 
-def _compile(wanted: Sequence[Library], platforms: Iterable[str]) -> None:
+def _compile(wanted: Sequence[Library], platforms: Container[str]) -> None:
     """All libraries and platforms side by side; each file is written at once or not at all."""
-    jobs = [(each, platform) for each in wanted for platform in platforms if not each.file(platform).exists()]
+    jobs = [(each, target) for each in wanted for target in each.targets if target in platforms]
+    jobs = [(each, target) for each, target in jobs if not each.file(target).exists()]
     if not jobs:
         return
     _require_compiler()
@@ -291,7 +304,7 @@ def _compile(wanted: Sequence[Library], platforms: Iterable[str]) -> None:
 
 
 def _compile_one(each: Library, name: str, folder: Path) -> None:
-    platform, path = PLATFORMS[name], each.file(name)
+    platform, path = TARGETS[name], each.file(name)
     made = folder / f"{each.name}-{name}"  # a folder, for what else the linker leaves beside it
     made.mkdir()
     command = [*compiler(platform), *LIBRARY_OPTIONS, *each.sources, *platform.options]
@@ -310,8 +323,9 @@ def compiler(platform: Platform) -> list[str]:
     """The compiler for a platform, with the options of every compilation."""
     home = resources.files(COMPILER[0])
     command = [str(home / ("zig.exe" if os.name == "nt" else "zig")), "cc", "-target", platform.target, *OPTIONS, "-I."]
-    if "-lkernel32" in platform.options:  # no C library: its headers are to be named
-        command += ["-isystem", str(home / "lib" / "libc" / "include" / "any-windows-any")]
+    own_headers = {".dll": ["any-windows-any"], ".wasm": ["wasm-wasi-musl", "generic-musl"]}
+    for folder in own_headers.get(platform.suffix, []):  # no C library: its headers are to be named
+        command += ["-isystem", str(home / "lib" / "libc" / "include" / folder)]
     return command
 
 

@@ -1,7 +1,7 @@
 """Packs the native FMUs: machine code that was compiled before (machine_code.py), its sources, description, pages."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from .archive import write_archive, zipped
@@ -17,7 +17,10 @@ FMI_2_FOLDERS = {"x86_64-linux": "linux64", "x86_64-windows": "win64", "x86_64-d
 
 
 def build_native_fmu(
-    path: str | os.PathLike[str] | None = None, flavour: Flavour = NATIVE, platforms: Iterable[str] = tuple(PLATFORMS)
+    path: str | os.PathLike[str] | None = None,
+    flavour: Flavour = NATIVE,
+    platforms: Iterable[str] = tuple(PLATFORMS),
+    more: Mapping[str, bytes] = {},
 ) -> Path:
     """Write the native FMU of a flavour to `path` (its folder is made) and return the path.
 
@@ -25,19 +28,20 @@ def build_native_fmu(
         path: the file; without it the identifier of the flavour as a name, in build/.
         flavour: NATIVE or NATIVE3, FMI 2.0 or FMI 3.0, or a variant of one.
         platforms: keys of PLATFORMS that it is to run on.
+        more: what else goes into its documentation, by name.
 
     Raises:
         NotCompiledError: there is no machine code of the C that is here.
         ValueError: the name does not end in .fmu.
         OSError: the file cannot be written; one that stood there before still does.
     """
-    return write_archive(path or f"build/{flavour.identifier}.fmu", lambda: _archive(flavour, platforms))
+    return write_archive(path or f"build/{flavour.identifier}.fmu", lambda: _archive(flavour, platforms, more))
 
 
-def _archive(flavour: Flavour, platforms: Iterable[str]) -> bytes:
-    pages = {**documents(flavour), **licenses("Sine, cosine and logarithm are fdlibm's", "fdlibm.txt", _sun_notice())}
+def _archive(flavour: Flavour, platforms: Iterable[str], more: Mapping[str, bytes]) -> bytes:
+    notices = licenses("Sine, cosine and logarithm are fdlibm's", "fdlibm.txt", _sun_notice())
     files = {
-        **{f"documentation/{name}": content for name, content in pages.items()},
+        **{f"documentation/{name}": each for name, each in {**documents(flavour, more), **notices}.items()},
         **reference_result(flavour),
         "sources/buildDescription.xml": xml(build_description(flavour, OPTIONS)),
     }

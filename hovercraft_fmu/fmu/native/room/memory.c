@@ -1,5 +1,5 @@
-/* With HOVERCRAFT_NO_LIBC, for Windows: what a library needs that is linked to the kernel's functions alone, so that it
-   depends on no C runtime. */
+/* With HOVERCRAFT_NO_LIBC, for Windows and WebAssembly: what a library needs that is linked to the kernel's functions
+   alone, or to none, so that it depends on no C runtime. */
 
 #include "memory.h"
 
@@ -19,7 +19,53 @@ void memory_release(void *memory)
 
 #else
 
+#include <stdint.h>
 #include <string.h>
+
+#ifdef __wasm__
+
+enum { PAGE = 65536 };
+struct block {
+    struct block *next;
+    size_t size; /* bytes, with this */
+};
+static struct block *freed;
+
+/* The first of what was given back that is large enough, or else whole pages: there are few instances, and states of one
+   size. NULL where there is no more. */
+static struct block *block_of(size_t size)
+{
+    for (struct block **at = &freed; *at; at = &(*at)->next) {
+        struct block *block = *at;
+        if (block->size >= size) {
+            *at = block->next;
+            return block;
+        }
+    }
+    const size_t pages = (size + PAGE - 1) / PAGE, before = __builtin_wasm_memory_grow(0, pages);
+    if (before == SIZE_MAX)
+        return NULL;
+    struct block *block = (struct block *)(before * PAGE);
+    block->size = pages * PAGE;
+    return block;
+}
+
+void *memory_allocate(size_t count, size_t size)
+{
+    struct block *block = block_of(sizeof *block + count * size);
+    return block ? memset(block + 1, 0, count * size) : NULL;
+}
+
+void memory_release(void *memory)
+{
+    if (!memory)
+        return;
+    struct block *block = (struct block *)memory - 1;
+    block->next = freed;
+    freed = block;
+}
+
+#else
 
 __declspec(dllimport) void *__stdcall GetProcessHeap(void);
 __declspec(dllimport) void *__stdcall HeapAlloc(void *heap, unsigned long flags, size_t bytes);
@@ -46,6 +92,8 @@ void memory_release(void *memory)
     if (memory)
         HeapFree(GetProcessHeap(), 0, memory);
 }
+
+#endif
 
 /* Or the compiler would make a call of memcpy of the loop in memcpy. */
 #define OWN __attribute__((no_builtin))
