@@ -10,8 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .autopilot.guidance import Commands, Gains, Pilot, Sight, Waypoint, steer
-from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE
+from .autopilot.guidance import Commands, Orders, Sight, Waypoint, beginning, steer
+from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, ORDERS
 from .building import default_fmu
 from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
 from .fmu.near_names import did_you_mean, must_be_one_of
@@ -30,6 +30,9 @@ COLUMNS = ("time", *STATES, *OUTPUTS)
 WIND = INPUTS[3:]
 START_VALUES = (*CRAFT_PARAMETERS, *STATES, *WIND)
 """Of the hovercraft: what a voyage may set."""
+TOLD = tuple(name for name in ORDERS if name in CRAFT_PARAMETERS)
+"""Parameters of the hovercraft that the autopilot has, too."""
+ARRIVED = COLUMNS.index("arrived") - 1
 
 
 class Part(Protocol):
@@ -85,7 +88,7 @@ class Passage:
     @property
     def acceptance_radius(self) -> float:
         """m: a waypoint this near is reached."""
-        return Gains().acceptance_radius
+        return _orders(self.voyage).acceptance_radius
 
 
 def sail(
@@ -119,10 +122,21 @@ def sail(
         craft_fmu.instance() as craft,
         pilot_fmu.instance() as pilot,
     ):
-        craft.start(chosen.craft)
-        pilot.start({name: chosen.craft[name] for name in STATES if name in chosen.craft})
+        initialize(craft, pilot, chosen)
         parts = FmuPart(craft, STATES, COMMANDS), FmuPart(pilot, OUTPUTS, STATES)
         return _sail(*parts, chosen, scheme, communication_step, stop_time, progress)
+
+
+def initialize(craft: Instance, pilot: Instance, chosen: Voyage) -> None:
+    """Both through initialization mode, in which the autopilot gets what the craft has: where it is, and what it is."""
+    craft.set(chosen.craft)
+    craft.enter_initialization()
+    pilot.enter_initialization()
+    for names in (STATES, TOLD):
+        pilot.port(*names).set(craft.port(*names).get())
+    pilot.set(chosen.autopilot)
+    craft.exit_initialization()
+    pilot.exit_initialization()
 
 
 def sail_bare(
@@ -136,15 +150,16 @@ def sail_bare(
     """The same with the bare functions. Raises as these do."""
     chosen = _chosen(which)
     craft = BareCraft(chosen, settings)
-    return _sail(craft, BareAutopilot(craft.state), chosen, scheme, communication_step, stop_time)
+    return _sail(craft, BareAutopilot(craft.state, _orders(chosen)), chosen, scheme, communication_step, stop_time)
 
 
 def _chosen(which: str | Voyage) -> Voyage:
     chosen = voyage(which) if isinstance(which, str) else which
-    for name, value in chosen.craft.items():
-        if name not in START_VALUES:
-            meant = did_you_mean(name, START_VALUES)
-            raise ValueError(f"{name} = {value!r}: must be one of {', '.join(START_VALUES)}{meant}")
+    for values, allowed in ((chosen.craft, START_VALUES), (chosen.autopilot, ORDERS)):
+        for name, value in values.items():
+            if name not in allowed:
+                meant = did_you_mean(name, allowed)
+                raise ValueError(f"{name} = {value!r}: must be one of {', '.join(allowed)}{meant}")
     return chosen
 
 
@@ -165,12 +180,13 @@ def _sail(
         if isinstance(value, bool) or not 0.0 < value < math.inf:
             raise ValueError(f"{name} = {value!r} s: must be a finite number greater than 0")
     check_steps(0.0, end, h, len(COLUMNS))
+    keeps_station = _orders(chosen).keep_station == 1
     rows = []
     for time, shown in master(craft, pilot, scheme, h, round(end / h)):
         rows.append((time, *shown))
         if progress:
             progress(time)
-        if shown[-1]:  # arrived
+        if shown[ARRIVED] and not keeps_station:
             break
     return Passage(np.array(rows, dtype=[(name, np.float64) for name in COLUMNS]), chosen, scheme)
 
@@ -222,6 +238,12 @@ def _craft(chosen: Voyage) -> Craft:
     return Craft(**{name: value for name, value in chosen.craft.items() if name in CRAFT_PARAMETERS})  # type: ignore[arg-type]
 
 
+def _orders(chosen: Voyage) -> Orders:
+    craft = _craft(chosen)
+    values: dict[str, Any] = {name: getattr(craft, name) for name in TOLD}
+    return Orders(**{**values, **chosen.autopilot})
+
+
 class BareCraft:
     """The hovercraft's model, without an FMU."""
 
@@ -251,18 +273,18 @@ class BareAutopilot:
     """The autopilot's law, without an FMU."""
 
     course = tuple(Waypoint(*point) for point in DEMO_COURSE)
-    gains = Gains()
 
-    def __init__(self, motion: State) -> None:
-        self.motion, self.pilot = motion, Pilot(Waypoint(motion.x, motion.y))
+    def __init__(self, motion: State, orders: Orders) -> None:
+        self.motion, self.orders, self.pilot = motion, orders, beginning(motion)
         self.commands, self.sight = Commands(), Sight()
         self.step(0.0, 0.0)
 
     def read(self) -> Sequence[float]:
         """See Part."""
-        reached, count = self.pilot.reached, len(self.course)
-        cross_track, distance = self.sight
-        return (*self.commands, min(reached + 1, count), cross_track, distance, reached == count)
+        pilot, count = self.pilot, len(self.course)
+        at_end = pilot.passed >= count
+        rest = (at_end, pilot.status, pilot.missed, pilot.turns)
+        return (*self.commands, min(pilot.passed + 1, count), *self.sight, *rest)
 
     def write(self, values: Sequence[float]) -> None:
         """See Part."""
@@ -270,4 +292,4 @@ class BareAutopilot:
 
     def step(self, _time: float, duration: float) -> None:
         """See Part."""
-        self.pilot, self.commands, self.sight = steer(self.pilot, self.motion, self.course, self.gains, duration)
+        self.pilot, self.commands, self.sight = steer(self.pilot, self.motion, self.course, self.orders, duration)

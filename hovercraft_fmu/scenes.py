@@ -241,6 +241,8 @@ class Voyage:
     description: str
     craft: Mapping[str, float] = field(default_factory=dict)
     """Start values of the hovercraft that differ from its own: parameters, states, wind."""
+    autopilot: Mapping[str, float] = field(default_factory=dict)
+    """Start values of the autopilot that differ from its own; what it has in common with the craft it is told."""
     communication_step: float = 0.5
     """s"""
     stop_time: float = 4000.0

@@ -16,8 +16,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from hovercraft_fmu.autopilot.guidance import Gains, Pilot, Waypoint, steer
-from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, GAINS, VARIABLES
+from hovercraft_fmu.autopilot.guidance import Orders, Waypoint, beginning, steer
+from hovercraft_fmu.autopilot.pilot_interface import (
+    AUTOPILOT_MODEL,
+    COMMANDS,
+    DEMO_COURSE,
+    ORDERS,
+    STATUS,
+    VARIABLES,
+    WAYPOINT_NAMES,
+)
 from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, STATES
 from hovercraft_fmu.host import read_description
 from hovercraft_fmu.model.dynamics import State
@@ -28,8 +36,9 @@ from tests.conftest import Fresh
 from tests.lowlevel import one
 from tests.strategies import numbers
 
-OUTPUTS = (*COMMANDS, "cross_track_error", "distance")
+OUTPUTS = (*COMMANDS, "cross_track_error", "distance", "turns")
 REALS = [v.name for v in VARIABLES if v.kind == "Real"]
+INTEGERS = [v.name for v in VARIABLES if v.kind == "Integer"]
 COURSE = [Waypoint(*point) for point in DEMO_COURSE]
 SOMEWHERE = State(12.0, 3.0, 0.4, 0.2, -0.1, 0.05)
 
@@ -57,8 +66,19 @@ def get(instance: Any, *names: str) -> list[float]:
 
 
 def everything(instance: Any) -> list[float]:
-    reached = instance.getInteger([reference("waypoint"), reference("waypoint_count")])
-    return [*get(instance, *REALS), *reached, *instance.getBoolean([reference("arrived")])]
+    numbers = instance.getInteger([reference(name) for name in INTEGERS])
+    return [*get(instance, *REALS), *numbers, *instance.getBoolean([reference("arrived")])]
+
+
+def sampled(first: State, then: State, duration: float) -> list[float]:
+    """OUTPUTS, by the bare law."""
+    pilot, _, _ = steer(beginning(first), first, COURSE, Orders(), 0.0)
+    pilot, commands, sight = steer(pilot, then, COURSE, Orders(), duration)
+    return [*commands, *sight, pilot.turns]
+
+
+def told(instance: Any) -> tuple[int, ...]:
+    return tuple(instance.getInteger([reference("status"), reference("missed")]))
 
 
 def start(instance: Any, time: float = 0.0) -> None:
@@ -88,12 +108,13 @@ def test_names_units_and_structure(autopilot: Path) -> None:
         assert {variables[name].causality, BY_NAME[name].causality} == {"input", "output"}
     assert set(COMMANDS) < set(INPUTS)
     assert [v.name for v in description.modelVariables if v.causality == "input"] == list(STATES)
-    outputs = [*COMMANDS, "waypoint", "cross_track_error", "distance", "arrived"]
+    outputs = [*COMMANDS, "waypoint", "cross_track_error", "distance", "arrived", "status", "missed", "turns"]
     assert [unknown.variable.name for unknown in description.outputs] == outputs
     assert all(unknown.dependencies == [] for unknown in description.outputs)
     for unknown in description.initialUnknowns:
-        assert {each.name for each in unknown.dependencies} >= {*STATES, *GAINS, "waypoint_count", "waypoint[8].y"}
-    assert [v.name for v in description.modelVariables if v.variability == "tunable"] == list(GAINS)
+        assert {each.name for each in unknown.dependencies} >= {*STATES, *ORDERS, "waypoint_count", "waypoint[32].y"}
+    tunable = {v.name for v in description.modelVariables if v.variability == "tunable"}
+    assert tunable == {*ORDERS, "waypoint_count", *WAYPOINT_NAMES}
     assert len({v.valueReference for v in description.modelVariables}) == len(VARIABLES)
     with zipfile.ZipFile(autopilot) as archive:
         xml = etree.fromstring(archive.read("modelDescription.xml"))
@@ -101,7 +122,7 @@ def test_names_units_and_structure(autopilot: Path) -> None:
     etree.XMLSchema(file=str(SCHEMAS / "fmi2" / "fmi2ModelDescription.xsd")).assertValid(xml)
     assert xml.get("variableNamingConvention") == "structured"
     assert all(f"<code>{variable.name}</code>" in page for variable in VARIABLES)
-    assert "w^2/(s + w)^2" in page
+    assert "h*M*Q/I" in page
 
 
 def test_the_same_bytes_elsewhere(autopilot: Path, fresh: Fresh, tmp_path: Path) -> None:
@@ -125,7 +146,7 @@ slave.exit_initialization_mode()
 print(slave.get_real([6, 7, 8]))
 assert "numpy" not in sys.modules
 """
-    assert fresh(code, tmp_path / "resources", flags=("-I", "-S")).strip() == "[6.0, 0.0, -0.0]"
+    assert fresh(code, tmp_path / "resources", flags=("-I", "-S")).strip() == "[7.199999999999999, 0.0, 0.0]"
 
 
 def test_what_runs_the_hovercraft_says_that_it_is_none(autopilot: Path) -> None:
@@ -143,12 +164,12 @@ def test_it_is_checked_elsewhere_but_in_no_host_of_the_hovercraft(autopilot: Pat
 
 def test_outputs_follow_the_start_values_before_the_first_step(instance: Any) -> None:
     see(instance, SOMEWHERE)
-    expected = steer(Pilot(Waypoint(12.0, 3.0)), SOMEWHERE, COURSE, Gains(), 0.0)
+    expected = sampled(SOMEWHERE, SOMEWHERE, 0.0)
     instance.setupExperiment()
     instance.enterInitializationMode()
-    assert get(instance, *OUTPUTS) == [*expected[1], *expected[2]]
+    assert get(instance, *OUTPUTS) == expected
     instance.exitInitializationMode()
-    assert get(instance, *OUTPUTS) == [*expected[1], *expected[2]]
+    assert get(instance, *OUTPUTS) == expected
     assert instance.getInteger([reference("waypoint")]) == [1]
     assert instance.getBoolean([reference("arrived")]) == [False]
 
@@ -160,16 +181,16 @@ def test_an_output_changes_with_the_step_not_with_the_input(instance: Any) -> No
     assert get(instance, *STATES) == list(SOMEWHERE)
     assert get(instance, *OUTPUTS) == before
     instance.doStep(0.0, 0.7)
-    expected = steer(Pilot(Waypoint(0.0, 0.0)), SOMEWHERE, COURSE, Gains(), 0.7)
-    assert get(instance, *OUTPUTS) == [*expected[1], *expected[2]]
+    expected = sampled(State(), SOMEWHERE, 0.7)
+    assert get(instance, *OUTPUTS) == expected
 
 
 def test_a_gain_that_is_tuned_acts_with_the_next_step(instance: Any) -> None:
     start(instance)
     put(instance, cruise_speed=0.1)
-    assert get(instance, "thrust") == [6.0]
+    assert get(instance, "thrust") == pytest.approx([7.2])
     instance.doStep(0.0, 0.5)
-    assert get(instance, "thrust") == [2.0]
+    assert get(instance, "thrust") == pytest.approx([2.4])
 
 
 def test_a_course_of_its_own(instance: Any, messages: list[str]) -> None:
@@ -184,8 +205,39 @@ def test_a_course_of_its_own(instance: Any, messages: list[str]) -> None:
         seen.append((*instance.getInteger([reference("waypoint")]), *instance.getBoolean([reference("arrived")])))
     assert seen == [(1, False), (2, False), (2, False), (2, True), (2, True)]
     assert get(instance, *COMMANDS) == [0.0, 0.0, 0.0]
-    assert get(instance, "distance") == [math.hypot(270.0, 40.0)]
-    assert messages == []
+    assert get(instance, "distance") == pytest.approx([math.hypot(270.0, 40.0)])
+    assert told(instance) == (1, 0)
+    assert messages == [f"status 1: {STATUS[1]} (said once)"]
+
+
+def test_waypoints_change_while_it_runs(instance: Any, messages: list[str]) -> None:
+    """The one that it goes to, and how many there are: more than eight; it goes on from the end of a course."""
+    start(instance)
+    instance.setReal([reference("waypoint[1].x"), reference("waypoint[1].y")], [30.0, 40.0])
+    assert get(instance, "distance") == [100.0]
+    instance.doStep(0.0, 0.5)
+    assert get(instance, "distance") == pytest.approx([50.0])
+    instance.setInteger([reference("waypoint_count")], [1])
+    see(instance, State(30.0, 35.0))
+    instance.doStep(0.5, 0.5)
+    assert instance.getBoolean([reference("arrived")]) == [True]
+    instance.setInteger([reference("waypoint_count")], [32])
+    instance.doStep(1.0, 0.5)
+    assert instance.getBoolean([reference("arrived")]) == [False]
+    assert instance.getInteger([reference("waypoint")]) == [2]
+    assert get(instance, "distance") == pytest.approx([math.hypot(130.0, 25.0)])
+    assert len(messages) == 1
+
+
+def test_what_it_tells_it_says_once(instance: Any, messages: list[str]) -> None:
+    instance.setReal([reference("yaw_rate_gain")], [100.0])
+    start(instance)
+    instance.doStep(0.0, 0.5)
+    see(instance, State(101.0, 20.0))
+    instance.doStep(0.5, 0.5)
+    instance.doStep(1.0, 0.5)
+    assert told(instance) == (2 + 64, 1)
+    assert messages == [f"status {bit}: {STATUS[bit]} (said once)" for bit in (64, 2)]
 
 
 # ---- faults
@@ -194,16 +246,22 @@ def test_a_course_of_its_own(instance: Any, messages: list[str]) -> None:
 FAULTS: dict[str, tuple[Callable[[Any], object], str]] = {
     "input nan": (lambda i: put(i, pose__x=math.nan), "pose.x = nan: must be a finite number"),
     "input inf": (lambda i: put(i, velocity__y=-math.inf), "velocity.y = -inf: must be a finite number"),
-    "gain zero": (lambda i: put(i, lookahead=0.0), "lookahead = 0.0 m: must be a finite number greater than 0"),
+    "radius zero": (
+        lambda i: put(i, acceptance_radius=0.0),
+        "acceptance_radius = 0.0 m: must be a finite number greater than 0",
+    ),
+    "gain below": (lambda i: put(i, lookahead=-1.0), "lookahead = -1.0 m: must be a finite number, 0 or greater"),
+    "thrust_min": (lambda i: put(i, thrust_min=1.0), "thrust_min = 1.0 N: must be a finite number, 0 or less"),
+    "choice": (lambda i: i.setInteger([reference("turn_back")], [2]), "turn_back = 2: must be 0 or 1"),
+    "no waypoints": (
+        lambda i: i.setInteger([reference("waypoint_count")], [0]),
+        "waypoint_count = 0: must be from 1 to",
+    ),
+    "waypoint nan": (
+        lambda i: i.setReal([reference("waypoint[9].x")], [math.nan]),
+        "waypoint[9].x = nan: must be a finite number",
+    ),
     "gain nan": (lambda i: put(i, heading_gain=math.nan), "heading_gain = nan: must be a finite number"),
-    "fixed": (
-        lambda i: i.setReal([reference("waypoint[1].x")], [1.0]),
-        "waypoint[1].x = 1.0: must not be set in state 'step mode' (fixed parameter)",
-    ),
-    "fixed integer": (
-        lambda i: i.setInteger([reference("waypoint_count")], [2]),
-        "waypoint_count = 2: must not be set",
-    ),
     "output": (lambda i: put(i, thrust=1.0), "thrust = 1.0: must not be set in state 'step mode' (discrete output)"),
     "boolean output": (lambda i: i.setBoolean([reference("arrived")], [True]), "arrived = True: must not be set"),
     "no such real": (lambda i: i.getReal([99]), "value reference 99: must be that of a variable of type Real"),
@@ -229,10 +287,10 @@ def test_a_fault_is_loud_and_loses_nothing(name: str, instance: Any, messages: l
 
 
 def test_an_impossible_course_is_refused(instance: Any, messages: list[str]) -> None:
-    for count in (0, 9):
+    for count in (0, 33):
         with pytest.raises(FMICallException):
             instance.setInteger([reference("waypoint_count")], [count])
-        assert messages[-1] == f"waypoint_count = {count}: must be from 1 to 8"
+        assert messages[-1] == f"waypoint_count = {count}: must be from 1 to 32"
 
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

@@ -1,6 +1,7 @@
 """What the communication step of the closed loop costs in accuracy, beside what the integrator costs."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,7 +9,7 @@ import polars as pl
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from ..autopilot.guidance import Pilot, Waypoint, helm, line_of_sight, wanted_force
+from ..autopilot.guidance import Orders, Waypoint, along, gains_for, helm, leg_to, pushed, wanted_force, wanted_turn
 from ..coupling import GAUSS_SEIDEL, JACOBI, SCHEMES, BareAutopilot, BareCraft, sail_bare
 from ..drawing.figures import new_figure
 from ..drawing.palette import INK, METHODS, OTHER, QUIET
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 VOYAGE = VOYAGES["crosswind"]
+FREE = replace(VOYAGE, autopilot={"turn_rate": 1.0})
+"""The same without the limit of the turn, which holds for the first tenth of a second: it then has smooth equations."""
 STRETCH = 120.0
 """s, from rest: the craft speeds up, turns into the wind, and comes to the leg; before the first waypoint."""
 EVERY = 4.0
@@ -50,16 +53,20 @@ def continuous() -> tuple[Path2, float]:
 
 
 def _solved(tolerance: float) -> Path2:
-    craft = BareCraft(VOYAGE, EXACT)
-    gains, leg = BareAutopilot.gains, (Waypoint(craft.state.x, craft.state.y), BareAutopilot.course[0])
+    craft = BareCraft(FREE, EXACT)
+    pilot = BareAutopilot(craft.state, Orders(**FREE.autopilot))  # type: ignore[arg-type]
+    origin, active, orders, gains = pilot.pilot.origin, pilot.course[0], pilot.orders, gains_for(pilot.orders, 0.0)
+    rate = orders.mass / gains.lag
 
     def rates(_time: float, y: NDArray[np.float64]) -> list[float]:
-        motion, pilot = State(*y[:6]), Pilot(leg[0], 0, y[6], y[7])
-        _, wanted = line_of_sight(*leg, motion, gains)
-        force_x, force_y = wanted_force(pilot, motion, wanted, gains)
-        controls = Controls(*helm((force_x, force_y), wanted, motion, gains), *craft.wind)
-        push = [(force_x - pilot.push_x) / gains.integral_time, (force_y - pilot.push_y) / gains.integral_time]
-        return [*derivatives(motion, controls, craft.craft), *push]
+        motion, carried = State(*y[:6]), y[6:]
+        way = along(leg_to(origin, active, motion), orders.cruise_speed, gains)
+        lasting = carried[0] - rate * motion.vx, carried[1] - rate * motion.vy
+        force = wanted_force(way, motion, lasting, orders, gains)
+        _, commands = helm(pilot.pilot, motion, force, wanted_turn(0, motion, way, force, orders), orders, gains, 1e9)
+        made = pushed(motion, commands, orders)
+        kept = [(made[0] - lasting[0]) / gains.lag, (made[1] - lasting[1]) / gains.lag]
+        return [*derivatives(motion, Controls(*commands, *craft.wind), craft.craft), *kept]
 
     times = np.arange(0.0, STRETCH + EVERY / 2, EVERY)
     start = [*craft.state, 0.0, 0.0]
@@ -70,7 +77,7 @@ def _solved(tolerance: float) -> Path2:
 def sampled(scheme: str, communication_step: float, settings: Settings = EXACT) -> Path2:
     """The same stretch with a communication step [s]."""
     passage = sail_bare(
-        VOYAGE, scheme=scheme, communication_step=communication_step, stop_time=STRETCH, settings=settings
+        FREE, scheme=scheme, communication_step=communication_step, stop_time=STRETCH, settings=settings
     )
     every = round(EVERY / communication_step)
     return np.column_stack((passage["pose.x"], passage["pose.y"]))[::every]
