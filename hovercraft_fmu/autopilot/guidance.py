@@ -558,7 +558,8 @@ def noticed(
         bits |= ARRIVED
     if pilot.missed > 0:
         bits |= MISSED
-    if distance > leg.length + orders.acceptance_radius + 2.0 * gains.lookahead:
+    drifts = arrived and orders.keep_station == 0
+    if not drifts and distance > leg.length + orders.acceptance_radius + 2.0 * gains.lookahead:
         bits |= AWAY
     if abs(pilot.swept) >= 2.0 * math.pi:
         bits |= CIRCLING

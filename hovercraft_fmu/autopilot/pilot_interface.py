@@ -37,6 +37,7 @@ STATUS = {
     NOTHING_TO_STEER: "there is nothing to steer with: steering_force is 0",
 }
 """The bits of the variable `status`; each is logged when it is first set."""
+_STATUS = "; ".join(f"{bit}: {text}" for bit, text in STATUS.items())
 _MEANING = {
     "acceptance_radius": "A waypoint this near is reached",
     "cruise_speed": "Speed over ground that is held on a leg",
@@ -53,7 +54,7 @@ _MEANING = {
     "length": "Of the craft: the bow thrusters push half of it ahead of the centre of gravity",
     "steering_force": "Of one bow thruster of the craft, full on; 0: there is nothing to steer with",
     "turn_back": "A waypoint that was missed: 0 leave it and begin the next leg, 1 turn back to it",
-    "keep_station": "At the end of the course: 0 thrust and thrusters off, 1 keep the last waypoint's place in the wind",
+    "keep_station": "At the end of the course: 0 thrust and thrusters off, 1 keep the place in the wind",
 }
 
 
@@ -124,8 +125,7 @@ VARIABLES: tuple[Variable, ...] = (
              "How many of the waypoints are to be reached", kind="Integer", minimum=1, maximum=WAYPOINTS_MAX),
     *_waypoints(14, 1, WAYPOINTS_FIRST),
     *(_order(30 + i, name) for i, name in enumerate(ORDERS[:_ORDERS_FIRST])),
-    _number(38, "status", "Sum of what happened since initialization: " + "; ".join(f"{b}: {t}" for b, t in STATUS.items()),
-            0, 255),
+    _number(38, "status", "Sum of what happened since initialization: " + _STATUS, 0, 255),
     _number(39, "missed", "Number of the waypoints that were missed", 0, WAYPOINTS_MAX),
     _output(40, "turns", "1", "Turns round the active waypoint, clockwise on the screen"),
     *(_order(41 + i, name) for i, name in enumerate(ORDERS[_ORDERS_FIRST:])),

@@ -9,7 +9,7 @@ import polars as pl
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from ..autopilot.guidance import Orders, Waypoint, along, gains_for, helm, leg_to, pushed, wanted_force, wanted_turn
+from ..autopilot.guidance import Orders, along, gains_for, helm, leg_to, pushed, wanted_force, wanted_turn
 from ..coupling import GAUSS_SEIDEL, JACOBI, SCHEMES, BareAutopilot, BareCraft, sail_bare
 from ..drawing.figures import new_figure
 from ..drawing.palette import INK, METHODS, OTHER, QUIET
