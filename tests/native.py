@@ -39,7 +39,7 @@ C_INCLUDES = ("-I", str(Path(elsewhere.__file__).parent))
 """Of the calls of both standards."""
 OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
 NO_RAMP = Controls(0.0)
-STEPS = {"semi_implicit_euler": 0.01, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05}
+STEPS = {"semi_implicit_euler": 0.01, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05, "splitting": 0.1}
 """s: a sub-step for each method, with which none of the scenes warns"""
 IN_TURN = dict(zip(SCENES, itertools.cycle(STEPS), strict=False))
 """A method for every scene."""
@@ -181,7 +181,7 @@ class Kernel:
         self, state: State, companion: Companion, craft: Craft, method: Integrator
     ) -> tuple[float, ...]:
         beside = CCompanion(CState(*companion.state), companion.proposed)
-        arguments = byref(CState(*state)), byref(beside), byref(CCraft(*astuple(craft))), method.order
+        arguments = byref(CState(*state)), byref(beside), method.rubbing_order if craft.rubs else method.order
         return numbers_of(self.library.kernel_estimated_error(*arguments), ("position", "heading"))
 
     def rounding(self, *arguments: float) -> float:

@@ -101,7 +101,7 @@ def test_a_number_of_no_item_is_refused(each_fmu: Path, value: int) -> None:
                 instance.setInteger([reference(number)], [value])
         assert messages == [
             f"integrator_number = {value}: must be 0 (as integrator says) or one of 1 (semi_implicit_euler), "
-            "2 (drag_implicit), 3 (rk4), 4 (adaptive)",
+            "2 (drag_implicit), 3 (rk4), 4 (adaptive), 5 (splitting)",
             f"drag_area_number = {value}: must be 0 (as drag_area says) or one of 1 (constant), 2 (directional)",
             f"error_estimate_number = {value}: must be 0 (as error_estimate says) or one of 1 (off), 2 (on)",
         ]

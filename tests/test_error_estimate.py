@@ -46,7 +46,7 @@ def driven(
     return state, estimated_error(state, companion, craft, settings.integrator)
 
 
-STEPS = {"semi_implicit_euler": 0.02, "drag_implicit": 0.02, "rk4": 0.5, "adaptive": 0.5}
+STEPS = {"semi_implicit_euler": 0.02, "drag_implicit": 0.02, "rk4": 0.5, "adaptive": 0.5, "splitting": 0.1}
 
 
 @pytest.mark.parametrize("scene", ["launch", "coast"])
@@ -106,12 +106,13 @@ def test_straight_sliding_on_ground_that_rubs_stops_where_it_does(method: str) -
 @pytest.mark.parametrize("rubs", [False, True])
 @pytest.mark.parametrize("method", INTEGRATORS)
 def test_the_factor_is_that_of_the_order(method: Integrator, rubs: bool) -> None:
-    """2^p/(2^p - 1); with friction no order is above 3."""
+    """2^p/(2^p - 1); with friction no order is above 3, and that of splitting is 1."""
     wanted = {
         "semi_implicit_euler": (2.0, 2.0),
         "drag_implicit": (2.0, 2.0),
         "rk4": (16.0 / 15.0, 8.0 / 7.0),
         "adaptive": (32.0 / 31.0, 8.0 / 7.0),
+        "splitting": (4.0 / 3.0, 2.0),
     }
     assert error_factor(method, rubs) == wanted[method.name][rubs]
 

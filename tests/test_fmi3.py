@@ -143,7 +143,8 @@ BAD_LISTS: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "an item of 64 bits": (
         lambda i: i.setInt64([reference("integrator")], [2**32 + 1]),
-        "integrator = 4294967297: must be one of 1 (semi_implicit_euler), 2 (drag_implicit), 3 (rk4), 4 (adaptive)",
+        "integrator = 4294967297: must be one of 1 (semi_implicit_euler), 2 (drag_implicit), 3 (rk4), 4 (adaptive), "
+        "5 (splitting)",
     ),
     "the least of 64 bits": (
         lambda i: i.setInt64([reference("drag_area")], [-(2**63)]),

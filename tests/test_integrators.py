@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import random
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from tests.test_scenes import EXACT, NAMES
 
 NONE = Controls(0.0, 0.0, 0.0)
 FIXED = [method for method in INTEGRATORS if method.integrate]
-ORDERS = {"semi_implicit_euler": 1.0, "drag_implicit": 1.0, "rk4": 4.0}
+ORDERS = {"semi_implicit_euler": 1.0, "drag_implicit": 1.0, "rk4": 4.0, "splitting": 2.0}
 
 
 def method(name: str) -> Any:
@@ -30,7 +31,7 @@ def method(name: str) -> Any:
 @pytest.mark.parametrize("scene", [each for each in EXACT if each.name != "coast"], ids=lambda each: each.name)
 def test_order_is_a_slope(name: str, scene: Any) -> None:
     """On the smooth scenes with an exact solution; coasting has its own test, where drag_implicit is exact."""
-    steps = np.array([0.04, 0.02, 0.01, 0.005]) * (12.0 if name == "rk4" else 1.0)  # above rounding
+    steps = np.array([0.04, 0.02, 0.01, 0.005]) * {"rk4": 12.0, "splitting": 4.0}.get(name, 1.0)  # above rounding
     errors = []
     for h in steps:
         end = advance(scene.start, Controls(*scene.rows[0][1:]), scene.craft, 48.0, Settings(h, method(name))).state
@@ -45,12 +46,53 @@ def test_drag_implicit_coasts_at_the_exact_speed(h: float) -> None:
     assert end.vx == pytest.approx(COAST_SPEED / (1.0 + 0.57421875 * COAST_SPEED * 60.0), rel=1e-11)  # 6e4 roundings
 
 
+STABLE = pytest.mark.parametrize("name", ["drag_implicit", "splitting"])
+"""At any step."""
+
+
+@STABLE
 @pytest.mark.parametrize("h", [0.01, 1.0, 100.0])
-def test_drag_implicit_keeps_the_exact_terminal_speed(h: float) -> None:
+def test_the_terminal_speed_stays_exact(name: str, h: float) -> None:
     terminal = math.sqrt(5.0 / Craft().drag_factor)
     start = State(vx=terminal)
-    end = advance(start, Controls(5.0, 0.0, 0.0), Craft(), 1000 * h, Settings(h, method("drag_implicit"))).state
+    end = advance(start, Controls(5.0, 0.0, 0.0), Craft(), 1000 * h, Settings(h, method(name))).state
     assert end.vx == pytest.approx(terminal, rel=1e-13)
+
+
+@pytest.mark.parametrize("craft", [Craft(), Craft(drag_area=2, rotational_drag=0.5)], ids=["plain", "every term"])
+def test_splitting_is_of_second_order_in_wind_and_in_a_turn(craft: Craft) -> None:
+    """Against RK4, whose error is below 1e-9 there; u and w have one sign each, so the directional area is smooth."""
+    start, asked = State(vx=1.0, vy=-0.3, yaw_rate=0.2), Controls(8.0, 0.3, 0.0, 0.4, -0.3)
+    exact = advance(start, asked, craft, 1.0, Settings(0.001, method("rk4"))).state
+    steps = 0.02 * 0.5 ** np.arange(4.0)
+    ends = [advance(start, asked, craft, 1.0, Settings(float(h), method("splitting"))).state for h in steps]
+    errors = [max(abs(a - b) for a, b in zip(end, exact, strict=True)) for end in ends]
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.05)
+
+
+def test_splitting_comes_to_the_terminal_speed_from_below_however_long_its_steps() -> None:
+    """Without a limit of stability, but not without error: of steps a thousand times too long 400 reach two thirds."""
+    craft, terminal = Craft(), math.sqrt(5.0 / Craft().drag_factor)
+    h = 1000.0 * craft.mass / (craft.drag_factor * terminal)
+    state, speeds = State(), [0.0]
+    for _ in range(400):
+        state = advance(state, Controls(5.0), craft, h, Settings(h, method("splitting"))).state
+        speeds.append(state.vx / terminal)
+    assert speeds[1:] == sorted(speeds[1:])
+    assert speeds[-1] == pytest.approx(0.66, abs=0.01)
+
+
+@pytest.mark.parametrize("density", [1e50, 1e100, 1e160, 1e300])
+def test_splitting_takes_any_drag(density: float) -> None:
+    """h times its rate is 1e52 to 1e302: above 1e154 its square is no number. The middle of a sub-step is in the
+    middle of the pose, and each takes off at least four fifths; where that is nearly nothing, all.
+    """
+    craft = Craft(air_density=density, drag_center_fraction=0.0)
+    end = advance(State(vx=1.0, vy=-2.0), NONE, craft, 2.0, Settings(1.0, method("splitting"))).state
+    assert (end.heading, end.yaw_rate) == (0.0, 0.0)
+    assert 0.0 <= end.vx <= 0.041
+    assert -2.0 * end.vx == pytest.approx(end.vy, rel=1e-9, abs=1e-15)
+    assert 0.5 <= end.x <= 0.73
 
 
 extreme_crafts = st.builds(
@@ -78,14 +120,38 @@ extreme_states = st.builds(
 )
 
 
+@STABLE
 @given(extreme_crafts, extreme_states, numbers(1e-4, 100.0))
-def test_drag_implicit_never_adds_energy(craft: Craft, state: State, h: float) -> None:
+def test_coasting_never_adds_energy(name: str, craft: Craft, state: State, h: float) -> None:
     energy = kinetic_energy(state, craft)
     for _ in range(20):
-        state = advance(state, NONE, craft, h, Settings(h, method("drag_implicit"))).state
+        state = advance(state, NONE, craft, h, Settings(h, method(name))).state
         after = kinetic_energy(state, craft)
         assert after <= energy * (1.0 + 1e-13)  # some hundred roundings a step
         energy = after
+
+
+def test_two_thousand_coasting_extremes_lose_energy_with_splitting() -> None:
+    """With every drag, evenly over powers of ten; 1e-15 a step is what some roundings of the velocities may add."""
+    dice = random.Random(7)
+
+    def spread(low: float, high: float) -> float:
+        return float(10.0 ** dice.uniform(math.log10(low), math.log10(high)))
+
+    for _ in range(2000):
+        craft = Craft(
+            mass=spread(1e-3, 1e6), inertia=spread(1e-3, 1e6), length=spread(0.1, 100.0), air_density=spread(1e-3, 1e3),
+            drag_center_fraction=dice.uniform(-0.5, 0.5), drag_area=dice.choice((1, 2)),
+            rotational_drag=dice.choice((0.0, dice.random())),
+        )  # fmt: skip
+        course, speed = dice.uniform(0.0, 6.3), spread(1e-3, 1e6)
+        state = State(vx=speed * math.cos(course), vy=speed * math.sin(course), yaw_rate=spread(1e-4, 1e4))
+        h, energy = spread(1e-4, 100.0), kinetic_energy(state, craft)
+        for _ in range(20):
+            state = advance(state, NONE, craft, h, Settings(h, method("splitting"))).state
+            after = kinetic_energy(state, craft)
+            assert after <= energy * (1.0 + 1e-15), (craft, state, h)
+            energy = after
 
 
 @given(crafts, states, controls, numbers(1e-4, 1e-3))

@@ -36,7 +36,7 @@ from tests.test_native_platforms import SANITIZERS
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 OUTPUTS = (*STATES, *MOTION)
-METHODS = {"semi_implicit_euler": 1, "drag_implicit": 2, "rk4": 3, "adaptive": 4}
+METHODS = {"semi_implicit_euler": 1, "drag_implicit": 2, "rk4": 3, "adaptive": 4, "splitting": 5}
 
 
 @pytest.fixture(scope="module")

@@ -204,15 +204,17 @@ def test_extremes_end_in_the_same_way(name: str, method: str, libm: Kernel) -> N
 RAMP, START = Controls(1.5, 0.2, -0.1, 0.3, -0.2), Controls(9.0, 0.1, 0.6, -0.1, 0.2)
 
 
-@pytest.mark.parametrize("method", ["semi_implicit_euler", "drag_implicit"])
-def test_first_order_methods_take_a_ramp_at_the_start_of_each_substep(method: str, libm: Kernel) -> None:
+@pytest.mark.parametrize(
+    ("method", "when"), [("semi_implicit_euler", 0.0), ("drag_implicit", 0.0), ("splitting", 0.5 * 0.001)]
+)
+def test_lower_methods_take_a_ramp_at_one_time_in_each_substep(method: str, when: float, libm: Kernel) -> None:
     """As if the controls were set anew, and held, sub-step by sub-step; thrust meets its limit on the way."""
     how = Settings(0.001, METHODS[method])
     state = State(vx=0.3, yaw_rate=0.05)
     outcome, made = libm.advance(state, START, Craft(), 2.0, how, rate=RAMP)
     assert outcome == "advanced"
     for i in range(2000):
-        t = i * 0.001
+        t = i * 0.001 + when
         held = Controls(*(start + t * rate for start, rate in zip(START, RAMP, strict=True)))
         state = advance(state, held, Craft(), 0.001, how).state
     assert made.state == state

@@ -100,7 +100,13 @@ def test_a_motion_out_of_range_is_refused(start: State) -> None:
 
 def test_methods_have_names_and_numbers() -> None:
     assert integrator_number("semi_implicit_euler") == 1
-    assert [method.name for method in INTEGRATORS] == ["semi_implicit_euler", "drag_implicit", "rk4", "adaptive"]
+    assert [method.name for method in INTEGRATORS] == [
+        "semi_implicit_euler",
+        "drag_implicit",
+        "rk4",
+        "adaptive",
+        "splitting",
+    ]
     bads: tuple[Any, ...] = (0, -1, len(INTEGRATORS) + 1, 2.7, True)
     for bad in bads:
         with pytest.raises(ValueError, match=f"integrator = {bad}: must be one of 1 "):

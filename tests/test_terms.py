@@ -118,9 +118,8 @@ def test_abeam_it_coasts_with_its_whole_side(method: Any) -> None:
     kappa = 0.5 * 1.225 * 1.25 * 20.0 * 5.0 / 100.0
     end = advance(State(vy=2.0), NONE, craft, 60.0, Settings(0.01, method, 1e-10)).state
     growth = 1.0 + kappa * 2.0 * 60.0
-    first_order = method.name in ("semi_implicit_euler", "drag_implicit")
-    assert end.vy == pytest.approx(2.0 / growth, abs=1e-4 if method.name == "semi_implicit_euler" else 1e-9)
-    assert end.y == pytest.approx(math.log(growth) / kappa, abs=0.04 if first_order else 1e-7)  # 2*h*v0
+    assert end.vy == pytest.approx(2.0 / growth, abs={1: 1e-4, 2: 1e-7}.get(method.order, 1e-9))
+    assert end.y == pytest.approx(math.log(growth) / kappa, abs={1: 0.04, 2: 1e-4}.get(method.order, 1e-7))  # 2*h*v0
     assert (end.x, end.heading, end.vx, end.yaw_rate) == (0.0, 0.0, 0.0, 0.0)
 
 
@@ -145,8 +144,7 @@ def test_yaw_decays_as_quadratic_drag_does(method: Any) -> None:
     end = advance(State(yaw_rate=0.5), NONE, craft, 60.0, Settings(0.001, method, 1e-10)).state
     growth = 1.0 + c * 0.5 * 60.0
     assert end.yaw_rate == pytest.approx(0.5 / growth, abs=1e-6 if method.name == "semi_implicit_euler" else 1e-9)
-    first_order = method.name in ("semi_implicit_euler", "drag_implicit")
-    assert end.heading == pytest.approx(math.log(growth) / c, abs=1e-3 if first_order else 1e-7)  # 2*h*r0
+    assert end.heading == pytest.approx(math.log(growth) / c, abs={1: 1e-3, 2: 1e-6}.get(method.order, 1e-7))  # 2*h*r0
 
 
 # ---- friction
@@ -190,7 +188,8 @@ def test_without_drag_a_sliding_craft_stops_where_it_should(method: Any, h: floa
     after = advance(start, NONE, SLIDING, stop + 2.0 * h, way).state
     assert math.hypot(before.vx, before.vy) == pytest.approx(2.0 * h * DECELERATION, rel=1e-6)
     assert after[3:] == (0.0, 0.0, 0.0)
-    error = {"semi_implicit_euler": 0.51 * h, "drag_implicit": 0.51 * h, "rk4": 15.0 * h * h, "adaptive": 1e-6}
+    error = {"semi_implicit_euler": 0.51 * h, "drag_implicit": 0.51 * h, "rk4": 15.0 * h * h, "adaptive": 1e-6,
+             "splitting": h * h}  # fmt: skip
     way_to_go = 0.5 / DECELERATION
     assert (after.x, after.y) == pytest.approx((0.6 * way_to_go, -0.8 * way_to_go), abs=error[method.name])
 
@@ -293,18 +292,22 @@ def test_the_friction_step_solves_its_equation(craft: Craft, state: State, h: fl
 
 
 def test_what_friction_does_to_the_order() -> None:
-    """First order stays; rk4 falls to the second where the craft comes to rest; adaptive follows its tolerance."""
+    """First order stays; rk4 falls to the second where the craft comes to rest, splitting to the first, from smaller
+    errors; adaptive follows its tolerance.
+    """
     scene = SCENES["drift_to_rest"]
     exact, uncertainty = reference_end(scene, 60.0)
     assert uncertainty < 1e-9
     orders = {}
     for name, steps in (("semi_implicit_euler", (0.05, 0.025, 0.0125, 0.00625)),
                         ("drag_implicit", (0.05, 0.025, 0.0125, 0.00625)),
+                        ("splitting", (0.0125, 0.00625, 0.003125, 0.0015625)),
                         ("rk4", (0.0625, 0.03125, 0.015625, 0.0078125))):  # fmt: skip
         errors = [largest(reached(scene, Setting(name, h, 0.5)).end, exact) for h in steps]
         orders[name] = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
     assert orders["semi_implicit_euler"] == pytest.approx(1.0, abs=0.1)
     assert orders["drag_implicit"] == pytest.approx(1.0, abs=0.1)
+    assert orders["splitting"] == pytest.approx(1.0, abs=0.1)
     assert orders["rk4"] == pytest.approx(2.0, abs=0.2)
     for tolerance in (1e-4, 1e-6, 1e-8):
         assert largest(reached(scene, Setting("adaptive", 0.01, 0.5, tolerance)).end, exact) < 10.0 * tolerance

@@ -94,6 +94,7 @@ struct variant {{
 struct method {{
     const char *name;
     int order;              /* of the error, as a power of the sub-step */
+    int rubbing_order;      /* what the estimate takes it for where skirt and ground rub */
     double stability_limit; /* 1 */
     double rotation_limit;  /* rad */
 }};
@@ -226,7 +227,8 @@ def variables_header(block: Block) -> str:
         phase_names=", ".join(_quoted(words) for _, words in PHASES),
         variables="\n".join(f"    [{constant(v.name)}] = {_row(v)}," for v in VARIABLES),
         methods="\n".join(
-            f"    {{{_quoted(m.name)}, {m.order}, {_number(m.stability_limit)}, {_number(m.rotation_limit)}}},"
+            f"    {{{_quoted(m.name)}, {m.order}, {m.rubbing_order}, {_number(m.stability_limit)}, "
+            f"{_number(m.rotation_limit)}}},"
             for m in INTEGRATORS
         ),
         choices="\n".join(

@@ -156,6 +156,17 @@ def air_speed(heading: float, vx: float, vy: float, yaw_rate: float, x_d: float)
     return math.sqrt(u * u + w * w)
 
 
+def drag_function(craft: Craft) -> Callable[[float, float], float]:
+    """(u, w), velocity of the centre of drag through the air, body frame [m/s] -> k*q, drag per air speed [kg/s]."""
+    sqrt, k = math.sqrt, craft.drag_factor
+    factor_ahead, factor_abeam = craft.drag_factor_ahead, craft.drag_factor_abeam
+    if k == 0.0:
+        return lambda _u, _w: 0.0
+    if craft.drag_area == DIRECTIONAL:
+        return lambda u, w: factor_ahead * abs(u) + factor_abeam * abs(w)
+    return lambda u, w: k * sqrt(u * u + w * w)
+
+
 def _without_drag(controls: Controls, craft: Craft, per_mass: float, per_inertia: float) -> LoadFunction:
     cos, sin = math.cos, math.sin
     thrust, side, turn = _pushes(controls, craft, per_mass, per_inertia)

@@ -26,10 +26,8 @@ NOT_SMALL = 0.25
 """Of the way that the craft has made: an estimate above it is none."""
 FEW = 20
 """Sub-steps: before so many even a small error is not small beside the way; and where friction brings a craft to rest
-in less, both may stop at once and be off alike."""
-FRICTION_ORDER = 3
-"""No method is taken for one of a higher order where the craft rubs: between the four of RK4 while it slides and the
-two where friction stops it or lets it go. Measured, as are the numbers above: hovercraft-fmu measure error-estimate."""
+in less, both may stop at once and be off alike. Measured, as are the numbers above: hovercraft-fmu measure
+error-estimate."""
 
 
 class Companion(NamedTuple):
@@ -99,7 +97,7 @@ def _in_two_halves(
 
 def error_factor(method: Integrator, rubs: bool) -> float:
     """1: what the difference is to be multiplied by."""
-    gain = 2.0 ** (min(method.order, FRICTION_ORDER) if rubs else method.order)
+    gain = 2.0 ** (method.rubbing_order if rubs else method.order)
     return gain / (gain - 1.0)
 
 

@@ -14,7 +14,7 @@ from ..fmu.near_names import explains_keywords
 from ..fmu.start_values import Value
 from ..fmu.start_values import start_values as numbers
 from ..host import SimulationError
-from ..model.integrators import INTEGRATORS, Integrator
+from ..model.integrators import ADAPTIVE, INTEGRATORS, Integrator
 from .cost import counted
 from .fmu_run import run_fmu, stepping
 from .planning import Inputs, Run, method_in_words, plan
@@ -131,7 +131,7 @@ class _Bench:
 
     def __init__(self, run: Run, fmu: str | os.PathLike[str], within: float) -> None:
         self._run, self._fmu, self._within = run, fmu, within
-        self._exact = _settings(INTEGRATORS[-1], REFERENCE)
+        self._exact = _settings(ADAPTIVE, REFERENCE)
         self._reference = self._made(self._exact)
 
     def _made(self, settings: Mapping[str, Value], **more: Value) -> Result:

@@ -18,7 +18,7 @@ from ..fmu.native_package import build_native_fmu
 from ..host.fleet import Crafts, Fleet, advance_fleet
 from ..model.dynamics import Controls, State
 from ..model.error_estimate import TIGHTER, Companion, estimated_error, is_lost, watched
-from ..model.integrators import INTEGRATORS, Integrator
+from ..model.integrators import ADAPTIVE, INTEGRATORS, Integrator
 from ..model.subcycling import Settings
 from ..scenes import SCENES
 from ..simulation import advise, metres
@@ -36,7 +36,6 @@ RUNS, SEGMENTS = 1000, 24
 """Of a method and a kind; communication steps of a run."""
 REFERENCE = 1e-10
 """Tolerance."""
-ADAPTIVE = INTEGRATORS[-1]
 KINDS = ("smooth", "every term, rubbing")
 SAMPLING = f"""\
 Sampled, evenly over powers of ten: mass 30 to 1000 kg, length 3 to 30 m, thrust 1 to 100 N, density 0.002 to 2 kg/m3,

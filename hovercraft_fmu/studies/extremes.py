@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias, cast
 
@@ -225,15 +226,15 @@ def first_order_bound(seen: Numbers, runs: Batch) -> Array:
     return runs.substeps * delta * (delta + seen.alpha + seen.phi) + rest
 
 
-def rk4_bound(seen: Numbers, runs: Batch) -> Array:
-    """1, of V: N*lambda*eps^4 + s*sigma*eps^2, lambda = s*sigma + rho + sqrt(tau), eps = lambda + alpha + phi.
+def higher_order_bound(order: int, seen: Numbers, runs: Batch) -> Array:
+    """1, of V: N*lambda*eps^order + s*sigma*eps^2, lambda = s*sigma + rho + sqrt(tau), eps = lambda + alpha + phi.
 
     With the directional area, s*sigma*eps more; with friction, the bound of first order.
     """
     drag = _aspect(runs) * seen.sigma
     rate = drag + seen.rho + np.sqrt(seen.tau)
     eps = rate + seen.alpha + seen.phi
-    smooth = runs.substeps * rate * eps**4 + drag * eps**2
+    smooth = runs.substeps * rate * eps**order + drag * eps**2
     kinks = np.where(runs.craft.drag_area == DIRECTIONAL, drag * eps, 0.0)
     rest = np.where(runs.craft.skirt_friction > 0.0, first_order_bound(seen, runs), 0.0)
     return smooth + kinks + rest
@@ -246,7 +247,12 @@ def _aspect(runs: Batch) -> Array:
 
 
 BOUNDS: Mapping[str, Callable[[Numbers, Batch], Array]] = MappingProxyType(
-    {"semi_implicit_euler": first_order_bound, "drag_implicit": first_order_bound, "rk4": rk4_bound}
+    {
+        "semi_implicit_euler": first_order_bound,
+        "drag_implicit": first_order_bound,
+        "rk4": partial(higher_order_bound, 4),
+        "splitting": partial(higher_order_bound, 2),
+    }
 )
 
 

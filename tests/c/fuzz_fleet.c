@@ -47,7 +47,7 @@ static int64_t advanced(int64_t first, int64_t count, int strides, int method, i
         reached.states[5] = NULL;
     if (missing == 4)
         way.proposed.values = NULL;
-    const bool no_method = method < SEMI_IMPLICIT_EULER || method > ADAPTIVE;
+    const bool no_method = method < SEMI_IMPLICIT_EULER || method > SPLITTING;
     const int64_t refused =
         fleet_advance(missing == 5 ? NULL : &fleet, missing == 6 ? NULL : &way, missing == 7 ? NULL : &reached);
     if ((refused < 0) != (no_method || missing || count < 0))

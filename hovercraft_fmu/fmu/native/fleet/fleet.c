@@ -413,7 +413,7 @@ int64_t fleet_advance(const struct fleet *fleet, const struct way *way, const st
 {
     if (!is_fleet(fleet) || !way || !is_there(&way->communication_step, 1) || !is_there(&way->step_size, 1) ||
         !is_there(&way->tolerance, 1) || !is_there(&way->proposed, 1) || !can_be_reached(reached) ||
-        way->integrator < SEMI_IMPLICIT_EULER || way->integrator > ADAPTIVE)
+        way->integrator < SEMI_IMPLICIT_EULER || way->integrator > SPLITTING)
         return -1;
     const struct environment host = environment_enter();
     const bool wide = is_wide();

@@ -9,13 +9,13 @@
 static const double MIN_STEP = 1e-12;     /* s: below it the adaptive method gives up */
 static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
 static const double NEAR_REST = 4.0;      /* sub-steps in which friction could stop the craft */
+static const double MOST = 1e100;         /* h times a rate of drag is taken as no more by splitting */
 static const double LEAST_SLIP = 1e-150;  /* m/s: so that at rest nothing is divided by zero */
 static const double UNIT = 0x1p-52;       /* relative: one or two units in the last place of a double */
 static const double LARGEST = 1e300;      /* m, rad: the estimate of an error where there is none */
 static const double TIGHTER = 32.0;       /* the adaptive companion's tolerance is smaller by this */
 static const double NOT_SMALL = 0.25;     /* of the way: an error above it is lost */
 static const int FEW = 20;                /* sub-steps: before so many even a small error is not small beside the way */
-static const int FRICTION_ORDER = 3;      /* no method is taken for one of a higher order where the craft rubs */
 static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds what is smaller, ties to even */
 
 /* With HOVERCRAFT_LIBM the platform's functions, which Python uses, too. */
@@ -278,6 +278,13 @@ struct air {
     double q;    /* m/s */
 };
 
+/* m/s: q, of (u, w). */
+static ALWAYS_INLINE double air_speed(const struct load_function *f, enum drag_kind kind, double u, double w)
+{
+    return kind == ANY_DRAG && f->directional ? f->ahead * fabs(u) + f->abeam * fabs(w)
+                                              : square_root(u * u + w * w);
+}
+
 static ALWAYS_INLINE struct air air_at(const struct load_function *f, enum drag_kind kind, double c, double s,
                                        double vx, double vy, double yaw_rate)
 {
@@ -290,8 +297,7 @@ static ALWAYS_INLINE struct air air_at(const struct load_function *f, enum drag_
     }
     air.u = c * vx + s * vy;
     air.w = c * vy - s * vx + yaw_rate * f->x_d;
-    air.q = kind == ANY_DRAG && f->directional ? f->ahead * fabs(air.u) + f->abeam * fabs(air.w)
-                                               : square_root(air.u * air.u + air.w * air.w);
+    air.q = air_speed(f, kind, air.u, air.w);
     return air;
 }
 
@@ -436,10 +442,9 @@ static inline void watch_yaw_rate(struct watch *watch, double yaw_rate)
     watch->right = larger(watch->right, yaw_rate);
 }
 
-static struct stretch stretch_of(struct load_function *f, const struct state *s, int64_t n, double h,
-                                 struct watch *watch)
+static struct stretch watched_stretch(const struct load_function *f, const struct state *s, int64_t n, double h,
+                                      const struct watch *watch)
 {
-    watch_loads(watch, f, f->kind, loads_at(f, s->heading, s->vx, s->vy, s->yaw_rate).kq, s->yaw_rate);
     return (struct stretch){
         .state = *s,
         .substeps = n,
@@ -447,6 +452,14 @@ static struct stretch stretch_of(struct load_function *f, const struct state *s,
         .rotation = h * larger(watch->right, -watch->left),
         .substep = h,
     };
+}
+
+/* And at its end. */
+static struct stretch stretch_of(struct load_function *f, const struct state *s, int64_t n, double h,
+                                 struct watch *watch)
+{
+    watch_loads(watch, f, f->kind, loads_at(f, s->heading, s->vx, s->vy, s->yaw_rate).kq, s->yaw_rate);
+    return watched_stretch(f, s, n, h, watch);
 }
 
 static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, const struct state *state, struct load_function *f,
@@ -600,6 +613,104 @@ static ALWAYS_INLINE struct stretch rk4(const struct state *state, const struct 
         return rk4_with_friction(state, drive, craft, h, n);
     struct load_function f = load_function(drive, craft, 1.0 / craft->mass, 1.0 / craft->inertia);
     return smooth_rk4(state, &f, h, n);
+}
+
+/* The constants of splitting. */
+struct relaxation {
+    double push;            /* m/s: of the drag point, abeam */
+    double ahead, abeam;    /* s/kg: h times the rate that a drag has for each */
+    double of_sway, of_yaw; /* 1, 1/m: what they have of a loss of the drag point's, abeam */
+};
+
+static ALWAYS_INLINE double at_most(double z)
+{
+    return z < MOST ? z : MOST;
+}
+
+static ALWAYS_INLINE double gained(double y, double push, double rate)
+{
+    const double z = at_most(rate), g = 1.0 + 0.5 * z;
+    return (push - z * y) * (g / (1.0 + z * g));
+}
+
+/* What friction leaves of the motion in the middle of a sub-step, from a state and its velocity through the air. */
+static struct air rubbed_half(const struct load_function *f, const struct relaxation *r,
+                              const struct friction *friction, double c, double s, const struct state *z,
+                              const struct air *air, const struct air *half)
+{
+    const double lost = air->w + 0.5 * r->push - half->w;
+    const double surge = half->u + (c * f->wind_x + s * f->wind_y);
+    const double sway = c * z->vy - s * z->vx + (0.5 * f->side - lost * r->of_sway);
+    const double yaw = z->yaw_rate + (0.5 * f->turn - lost * r->of_yaw);
+    double surge_left = surge, sway_left = sway, yaw_left = yaw;
+    rub(friction, &surge_left, &sway_left, &yaw_left);
+    return (struct air){
+        .u = half->u + (surge_left - surge),
+        .w = half->w + (sway_left - sway + (yaw_left - yaw) * f->x_d),
+    };
+}
+
+/* Of loads in the time h. */
+static ALWAYS_INLINE struct stretch splitting_as(enum drag_kind kind, const struct state *state,
+                                                 struct load_function *f, double h, int64_t n)
+{
+    const double half = 0.5 * h, lever = 0.5 * f->drag_rate;
+    const bool spins = f->craft->rotational_drag != 0.0;
+    const double slowing = half * spin_drag_factor(f->craft) / f->craft->inertia;
+    const struct friction friction = friction_function(f->craft, h), of_half = friction_function(f->craft, half);
+    struct relaxation r = {
+        .ahead = f->per_mass,
+        .abeam = h * lever,
+        .of_sway = 1.0 / (f->craft->mass * lever),
+        .of_yaw = f->x_d / f->craft->inertia / lever,
+    };
+    struct state z = *state;
+    struct watch watch = {0.0, z.yaw_rate, z.yaw_rate};
+    for (int64_t i = 0; i < n; i++) {
+        steer_at(f, (double)i * h + half);
+        r.push = f->side + f->x_d * f->turn;
+        z.x = z.x + half * z.vx;
+        z.y = z.y + half * z.vy;
+        z.heading = z.heading + half * z.yaw_rate;
+        const struct trig_pair turned = sine_cosine(z.heading, &f->last);
+        const double c = turned.cosine, s = turned.sine, begun = fabs(z.yaw_rate);
+        if (spins)
+            z.yaw_rate = z.yaw_rate / (1.0 + slowing * fabs(z.yaw_rate));
+        const struct air air = air_at(f, kind, c, s, z.vx, z.vy, z.yaw_rate);
+        const double kq = kind == WITHOUT_DRAG ? 0.0 : f->k * air.q;
+        struct air middle = {
+            .u = (air.u + 0.5 * f->thrust) / (1.0 + at_most(0.5 * (kq * r.ahead))),
+            .w = (air.w + 0.5 * r.push) / (1.0 + at_most(0.5 * (kq * r.abeam))),
+        };
+        if (friction.rubs)
+            middle = rubbed_half(f, &r, &of_half, c, s, &z, &air, &middle);
+        const double then = kind == WITHOUT_DRAG ? 0.0 : f->k * air_speed(f, kind, middle.u, middle.w);
+        double surge = f->thrust, sway = f->side, yaw = f->turn;
+        if (then != 0.0) {
+            const double lost = r.push - gained(air.w, r.push, then * r.abeam);
+            surge = gained(air.u, f->thrust, then * r.ahead);
+            sway = f->side - lost * r.of_sway;
+            yaw = f->turn - lost * r.of_yaw;
+        }
+        z.vx = z.vx + (c * surge - s * sway);
+        z.vy = z.vy + (s * surge + c * sway);
+        z.yaw_rate = z.yaw_rate + yaw;
+        if (spins)
+            z.yaw_rate = z.yaw_rate / (1.0 + slowing * fabs(z.yaw_rate));
+        if (friction.rubs)
+            rub(&friction, &z.vx, &z.vy, &z.yaw_rate);
+        z.x = z.x + half * z.vx;
+        z.y = z.y + half * z.vy;
+        z.heading = z.heading + half * z.yaw_rate;
+        watch_loads(&watch, f, kind, then > kq ? then : kq, larger(begun, fabs(z.yaw_rate)));
+        watch_yaw_rate(&watch, z.yaw_rate);
+    }
+    return watched_stretch(f, &z, n, h, &watch);
+}
+
+static struct stretch splitting(const struct state *state, struct load_function *f, double h, int64_t n)
+{
+    return f->kind == PLAIN_DRAG ? splitting_as(PLAIN_DRAG, state, f, h, n) : splitting_as(f->kind, state, f, h, n);
 }
 
 enum { STAGES = 7 };
@@ -831,7 +942,7 @@ static ALWAYS_INLINE enum outcome fixed(const struct state *state, const struct 
         *stretch = drag_implicit(state, &f, h, n);
     } else {
         struct load_function f = load_function(drive, craft, h / craft->mass, h / craft->inertia);
-        *stretch = semi_implicit_euler(state, &f, h, n);
+        *stretch = integrator == SPLITTING ? splitting(state, &f, h, n) : semi_implicit_euler(state, &f, h, n);
     }
     return checked(stretch);
 }
@@ -910,17 +1021,16 @@ void kernel_watch(struct companion *companion, const struct state *before, const
 }
 
 /* What the difference between the two is to be multiplied by. */
-static double error_factor(const struct craft *craft, int order)
+static double error_factor(int order)
 {
-    const double gain = (double)(1 << (rubs(craft) && order > FRICTION_ORDER ? FRICTION_ORDER : order));
+    const double gain = (double)(1 << order);
     return gain / (gain - 1.0);
 }
 
-struct error kernel_estimated_error(const struct state *state, const struct companion *companion,
-                                    const struct craft *craft, int order)
+struct error kernel_estimated_error(const struct state *state, const struct companion *companion, int order)
 {
     const struct state *other = &companion->state;
-    const double factor = error_factor(craft, order);
+    const double factor = error_factor(order);
     const double dx = other->x - state->x, dy = other->y - state->y;
     const double position = factor * square_root(dx * dx + dy * dy);
     const double heading = factor * fabs(other->heading - state->heading);

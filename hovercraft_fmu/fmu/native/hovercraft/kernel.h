@@ -70,7 +70,7 @@ struct loads {
     double kq;     /* kg/s: k*q, the drag per air speed */
 };
 
-enum integrator { SEMI_IMPLICIT_EULER = 1, DRAG_IMPLICIT, RK4, ADAPTIVE };
+enum integrator { SEMI_IMPLICIT_EULER = 1, DRAG_IMPLICIT, RK4, ADAPTIVE, SPLITTING };
 
 struct settings {
     double step_size; /* s */
@@ -145,8 +145,7 @@ HIDDEN void kernel_accompany(struct companion *companion, const struct drive *dr
 HIDDEN void kernel_watch(struct companion *companion, const struct state *before, const struct state *after,
                          const struct craft *craft);
 /* By now, for a method of that order. */
-HIDDEN struct error kernel_estimated_error(const struct state *state, const struct companion *companion,
-                                           const struct craft *craft, int order);
+HIDDEN struct error kernel_estimated_error(const struct state *state, const struct companion *companion, int order);
 /* Whether such an estimate [m] can be trusted no more, after so many sub-steps of a size [s]; 0 of the adaptive
    method. */
 HIDDEN bool kernel_is_lost(double position, const struct state *state, const struct companion *companion,

@@ -107,7 +107,9 @@ struct error instance_error(const struct content *content)
 {
     if (!content->estimates)
         return (struct error){0.0, 0.0};
-    return kernel_estimated_error(&content->state, &content->companion, &content->craft, method_of(content)->order);
+    const struct method *method = method_of(content);
+    return kernel_estimated_error(&content->state, &content->companion,
+                                  content->craft.skirt_friction != 0.0 ? method->rubbing_order : method->order);
 }
 
 static enum verdict warn_of_the_step(struct instance *instance)
