@@ -1,6 +1,5 @@
 """What the FMI cross-check asks of an exporting tool: the native FMU, inputs, options and a reference result."""
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from .fmu.interface import INPUTS, OUTPUTS
 from .fmu.native_package import build_native_fmu
 from .scenes import scene
 from .simulation import holding, plan, run_fmu
+from .whole import check_writable, write_whole
 
 SCENE = "slalom"
 """Starts at rest with all start values as they are; its inputs are continuous."""
@@ -36,21 +36,27 @@ def write_cross_check(folder: Path) -> list[Path]:
     name, chosen = NATIVE.identifier, scene(SCENE)
     places = [folder / "fmus" / "2.0" / "cs" / each / "hovercraft-fmu" / __version__ / name for each in PLATFORMS]
     first = places[0]
+    for place in places:
+        check_writable(place / f"{name}.fmu")
     fmu = build_native_fmu(first / f"{name}.fmu")
     result = run_fmu(holding(plan(chosen)), fmu)
     step = chosen.communication_step
     options = {"StartTime": 0.0, "StopTime": chosen.stop_time, "StepSize": step, "RelTol": 1e-4}
-    (first / f"{name}_ref.opt").write_text("".join(f"{key},{value!r}\n" for key, value in options.items()))
-    _write_csv(first / f"{name}_in.csv", plan(chosen).signals, ("time", *INPUTS))
-    _write_csv(first / f"{name}_ref.csv", result.data, ("time", *OUTPUTS))
-    (first / "ReadMe.txt").write_text(README.format(name=name, version=__version__, step=step))
-    for place in places[1:]:
-        shutil.copytree(first, place, dirs_exist_ok=True)
+    files = {
+        f"{name}_ref.opt": "".join(f"{key},{value!r}\n" for key, value in options.items()),
+        f"{name}_in.csv": _csv(plan(chosen).signals, ("time", *INPUTS)),
+        f"{name}_ref.csv": _csv(result.data, ("time", *OUTPUTS)),
+        "ReadMe.txt": README.format(name=name, version=__version__, step=step),
+    }
+    for place in places:
+        for file, text in files.items():
+            write_whole(place / file, text.encode())
+        write_whole(place / fmu.name, fmu.read_bytes())
     return places
 
 
-def _write_csv(path: Path, table: NDArray[np.void], names: Sequence[str]) -> None:
+def _csv(table: NDArray[np.void], names: Sequence[str]) -> str:
     """All digits; names in quotes, as they have dots."""
     header = ",".join(f'"{name}"' for name in names)
     rows = "\n".join(",".join(repr(float(value)) for value in row) for row in table[list(names)])
-    path.write_text(f"{header}\n{rows}\n")
+    return f"{header}\n{rows}\n"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hovercraft_fmu.simulation import read_inputs
+from hovercraft_fmu.simulation.control_log import ENDED, RECORDED, read_control_log
 
 ROWS = [(0.0, 5.0, 0.0), (10.0, 5.0, 0.0), (10.0, 5.5, 1.0)]
 """time, thrust, port_thruster"""
@@ -105,3 +106,12 @@ def test_all_digits_are_kept(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("time,thrust\n" + "".join(f"{i},{value!r}\n" for i, value in enumerate(values.tolist())))
     assert (read_inputs(path)["thrust"] == values).all()
+
+
+def test_a_record_that_was_cut_is_told_from_one_that_is_whole(tmp_path: Path) -> None:
+    """Its last line may be half of one."""
+    path, rows = tmp_path / "log.csv", f"time,thrust\n{RECORDED}\n0.0,5.0\n0.5,5.0\n1.0,7"
+    for end, cut, last in (("", True, 0.5), (".5\n", True, 1.0), (f".5\n{ENDED}by the operator\n", False, 1.0)):
+        path.write_text(rows + end)
+        table, is_cut = read_control_log(path)
+        assert (is_cut, table["time"][-1]) == (cut, last)

@@ -28,6 +28,7 @@ from hovercraft_fmu.view.drive import drive, plan_drive
 from hovercraft_fmu.view.operator import TIME_SCALE
 from hovercraft_fmu.view.window import BAR, SIZE, VIEW_LENGTHS
 from tests.conftest import Fresh
+from tests.shell import Shell
 
 Picture = NDArray[np.uint8]
 """Red, green, blue; shape (height, width, 3)."""
@@ -315,6 +316,21 @@ def test_the_command_from_the_keyboard_to_the_replay(fmu: Path, tmp_path: Path) 
     place = re.search(r"\n# ended .*, at (\(.*\)) m\n$", log.read_text())
     assert place
     assert f"end position   {place[1]} m" in replayed.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_killed_drive_loses_a_second_and_its_record_says_so(native_fmu: Path, shell: Shell) -> None:
+    driven = subprocess.Popen(command("drive", str(native_fmu), "--record", "log.csv"), cwd=shell.folder)
+    log = shell.folder / "log.csv"
+    while not log.exists():
+        assert driven.poll() is None
+        time.sleep(0.05)
+    driven.kill()
+    driven.wait()
+    rows = read_inputs(log)
+    assert rows["time"][-1] > 0.5 * TIME_SCALE
+    said = "log.csv: the record was cut, it does not say how it ended: at most a second is missing"
+    assert said in shell.ok("simulate", str(native_fmu), "--input", "log.csv")
 
 
 def test_without_pygame_it_says_how_to_get_it(tmp_path: Path) -> None:

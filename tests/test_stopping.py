@@ -6,11 +6,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from hovercraft_fmu import whole
+from hovercraft_fmu import Result, simulate, whole
+from hovercraft_fmu.fmu.archive import write_archive
+from hovercraft_fmu.view.animation import animate
+from hovercraft_fmu.view.plots import plot_run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 SOON = 5.0
@@ -110,6 +117,50 @@ def test_a_file_is_whole_or_what_it_was(tmp_path: Path) -> None:
         _interrupted_at(path)
     assert path.read_bytes() == b"first"
     assert [each.name for each in path.parent.iterdir()] == ["file"]
+
+
+@contextmanager
+def no_room(size: int) -> Iterator[None]:
+    """No file can be larger, as where the disk is full."""
+    resource = pytest.importorskip("resource", reason="of POSIX")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+WRITERS: dict[str, Callable[[Result, Path], Any]] = {
+    "a.csv": lambda result, path: result.write_csv(path),
+    "a.png": plot_run,
+    "a.gif": lambda result, path: animate([result], path),
+    "a.html": lambda result, path: animate([result], path),
+    "a.fmu": lambda _, path: write_archive(path, lambda: bytes(10**5)),
+}
+
+
+def test_a_full_disk_takes_nothing_away(native_fmu: Path, tmp_path: Path) -> None:
+    result = simulate("turn", native_fmu, stop_time=0.2)
+    for name, write in WRITERS.items():
+        path = tmp_path / name
+        path.write_bytes(b"old")
+        with no_room(100), pytest.raises(OSError, match="with room for it") as refused:
+            write(result, path)
+        assert refused.value.filename == str(path)
+        assert path.read_bytes() == b"old"
+    assert {path.name for path in tmp_path.iterdir()} == set(WRITERS)
+
+
+def test_what_is_no_file_is_written_to(native_fmu: Path, tmp_path: Path) -> None:
+    """A pipe, or /dev/null: nothing takes its place."""
+    result, pipe = simulate("turn", native_fmu, stop_time=0.2), tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor(1) as pool:
+        read = pool.submit(pipe.read_text)
+        result.write_csv(pipe)
+    assert read.result() == result.write_csv(tmp_path / "a.csv").read_text()
+    assert pipe.is_fifo()
 
 
 def _interrupted_at(path: Path) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .files import validated
-from .options import FOLDER
+from .options import FOLDER, make_room
 from .output import OUTPUT, print_rows, progress_of
 from .running import print_result, simulated, write
 
@@ -27,6 +27,7 @@ def demo(loop: bool) -> None:
     from ..simulation import holding, plan
 
     picture = check_plot(DEMO_FOLDER / ("loop.png" if loop else "ice.png"))
+    make_room(picture, picture.with_suffix(".csv"))
     native = _built_and_valid(default_kind())
     if loop:
         return _demo_of_the_loop(native, _built_and_valid("autopilot"), picture)

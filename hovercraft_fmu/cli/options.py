@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..whole import check_writable
 from .output import OUTPUT
 
 if TYPE_CHECKING:
@@ -60,12 +61,6 @@ def named_fmu(fmu: Path | None, kind: "Kind | None") -> Path:
 
 
 def make_room(*files: Path | None) -> None:
-    """Make the folders of files that are written after a run: what cannot be is said before it."""
+    """What cannot be written after a run is said before it. Raises OSError."""
     for file in filter(None, files):
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            why = f"{error.filename}: {error.strerror}"
-            raise click.ClickException(f"{file}: must be in a folder that can be made; {why}") from error
-        if file.is_dir():
-            raise click.ClickException(f"{file}: is a folder: must be the name of a file")
+        check_writable(file)

@@ -5,6 +5,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..whole import written
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -39,8 +41,7 @@ def new_figure(**options: Any) -> "Figure":
 
 
 def save(figure: "Figure", path: Path) -> Path:
-    """Write a picture, whose folder is made, and return its path. Raises OSError."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with importlib.import_module("matplotlib").rc_context({"svg.hashsalt": "hovercraft"}):
-        figure.savefig(path, metadata=PICTURES[path.suffix])
+    """Write a picture, whose folder is made, at once or not at all, and return its path. Raises OSError."""
+    with importlib.import_module("matplotlib").rc_context({"svg.hashsalt": "hovercraft"}), written(path) as unfinished:
+        figure.savefig(unfinished, format=path.suffix[1:], metadata=PICTURES[path.suffix])
     return path

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from hovercraft_fmu import Crafts, advance_fleet
-from hovercraft_fmu.drawing.figures import check_plot, new_figure
+from hovercraft_fmu.drawing.figures import check_plot, new_figure, save
 from hovercraft_fmu.drawing.palette import SHADES
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS, integrator_number
 from hovercraft_fmu.model.subcycling import Settings
+from hovercraft_fmu.whole import check_writable
 
 COUNT, SECONDS = 10_000, 60
 RK4 = Settings(step_size=0.1, integrator=INTEGRATORS[integrator_number("rk4") - 1])
@@ -19,6 +20,7 @@ RK4 = Settings(step_size=0.1, integrator=INTEGRATORS[integrator_number("rk4") - 
 def main(path: Path) -> None:
     """Write the picture."""
     check_plot(path)
+    check_writable(path)
     dice = np.random.default_rng(1)
     crafts = Crafts(mass=dice.normal(100.0, 10.0, COUNT), air_density=0.0023769)
     states = np.zeros((len(State._fields), COUNT))
@@ -34,7 +36,7 @@ def main(path: Path) -> None:
     axes.scatter(states[0], states[1], c=np.hypot(states[3], states[4]), s=1.0, cmap=SHADES)
     axes.set(title=f"{COUNT} craft after {SECONDS} s", xlabel="x [m]", ylabel="y [m], down", aspect="equal")
     axes.invert_yaxis()
-    figure.savefig(path)
+    save(figure, path)
     print(f"wrote {path}: {COUNT} craft, {np.hypot(*states[:2]).mean():.1f} m from the start in the mean")
 
 

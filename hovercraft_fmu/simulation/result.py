@@ -18,6 +18,7 @@ from ..drawing.run_picture import draw_run, path_svg
 from ..fmu.interface import BY_NAME, ERROR_LOST
 from ..fmu.near_names import must_be_one_of
 from ..model.error_estimate import ON
+from ..whole import written
 from .planning import Run
 
 if TYPE_CHECKING:
@@ -162,8 +163,8 @@ def metres(distance: float) -> str:
 
 
 def write_csv(data: NDArray[np.void], path: str | os.PathLike[str]) -> Path:
-    """Write a structured array as CSV, with all digits; its folder is made."""
+    """Write a structured array as CSV, with all digits, at once or not at all; its folder is made."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    fmpy.util.write_csv(path, data)
+    with written(path) as unfinished:
+        fmpy.util.write_csv(unfinished, data)
     return path

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..fmu.near_names import must_be_one_of
+from ..whole import check_writable
 
 NEEDED = ("matplotlib", "polars", "scipy")
 
@@ -58,6 +59,7 @@ def carry_out(name: str, quick: bool, folder: Path, tell: Callable[[float], None
         raise ModuleNotFoundError(
             f"measurements need {error.name}, which is not installed: pip install 'hovercraft-fmu[studies]'"
         ) from error
+    check_writable(folder / "machine.txt")
     findings = module.measure(quick, tell)
     findings.write(folder)
     report: str = findings.report()

@@ -16,10 +16,13 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeAlias, TypeVar
 import polars as pl
 
 from .._version import __version__
+from ..drawing.figures import save
+from ..whole import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MACHINE = "machine.txt"
 Key = TypeVar("Key")
 Found = TypeVar("Found")
 Tell: TypeAlias = Callable[[float], None]
@@ -119,15 +122,14 @@ class Findings:
 
     def write(self, folder: Path) -> None:
         """Everything into a folder, which is made. Raises OSError where that cannot be done."""
-        folder.mkdir(parents=True, exist_ok=True)
         for name, frame in self.records.items():
-            frame.write_csv(folder / f"{name}.csv")
+            write_whole(folder / f"{name}.csv", frame.write_csv().encode())
         for shown in self.tables:
             if shown.name:
-                (folder / f"{shown.name}.md").write_text(text(shown.frame) + "\n", encoding="utf-8")
+                write_whole(folder / f"{shown.name}.md", f"{text(shown.frame)}\n".encode())
         for name, figure in self.pictures.items():
-            figure.savefig(folder / f"{name}.png", format="png", metadata={"Software": None})
-        (folder / "machine.txt").write_text(machine() + "\n", encoding="utf-8")
+            save(figure, folder / f"{name}.png")
+        write_whole(folder / MACHINE, f"{machine()}\n".encode())
 
     def report(self) -> str:
         """What is printed: the tables, the notes, the machine."""

@@ -33,7 +33,7 @@ from ..sweeps.charts import plot_sweep
 from ..sweeps.study import SHIPPED
 from ..view.diagram import draw_diagram
 from ..view.plots import plot_passage, plot_run
-from ..whole import temporary_folder
+from ..whole import temporary_folder, write_whole
 from . import closed_loop, scene_terms, work_precision
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def assemble(results: Path = RESULTS) -> list[Path]:
         )
         files[RESULT] = default_result(build_native_fmu(Path(folder) / "HovercraftNative.fmu"))
     for path, content in files.items():
-        path.write_bytes(content)
+        write_whole(path, content)
     return sorted(files)
 
 

@@ -17,6 +17,7 @@ from ..drawing.shapes import Shape, jets, placed
 from ..fmu.icon import outline
 from ..fmu.near_names import explains_keywords
 from ..simulation import Result, metres
+from ..whole import written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -122,8 +123,8 @@ def animate(results: Result | Sequence[Result], path: str | os.PathLike[str], te
     if not np.array_equal(results[0]["time"], results[-1]["time"]):
         raise ValueError("results: must have the same communication points")
     tracks = [Track(*each) for each in zip(results, _names(results), _colors(results), strict=True)]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    (_write_gif if path.suffix == ".gif" else _write_page)(tracks, path, tell)
+    with written(path) as unfinished:
+        (_write_gif if path.suffix == ".gif" else _write_page)(tracks, unfinished, tell)
     return path
 
 
@@ -188,7 +189,7 @@ def _write_gif(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
     palette = _palette()
     first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
     times = [FRAME_TIME] * len(rest) + [LAST_FRAME_TIME]
-    first.save(path, save_all=True, append_images=rest, duration=times, loop=0, optimize=True)
+    first.save(path, "GIF", save_all=True, append_images=rest, duration=times, loop=0, optimize=True)
 
 
 def _palette() -> Image.Image:

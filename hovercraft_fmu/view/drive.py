@@ -5,6 +5,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
+from io import FileIO
 from math import inf
 from pathlib import Path
 from time import perf_counter
@@ -20,6 +21,7 @@ from ..scenes import signals
 from ..simulation import Run, Stepper, check_effect, plan, stepping
 from ..simulation.control_log import ENDED, RECORDED
 from ..stopping import SIGNALS
+from ..whole import check_writable, write_whole
 from .operator import PRESET, TIME_SCALE, Action, Operator, Pace
 from .window import Frame, Window, pygame
 
@@ -141,11 +143,12 @@ class ControlLog:
     """
 
     def __init__(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        check_writable(path)
         self.path, self.last = path, -inf
         self._held: Controls | None = None
-        self._file = path.open("wb", buffering=0)
-        self._lines, self._flushed = [",".join(("time", *INPUTS)), RECORDED], -inf
+        self._file: FileIO | None = None
+        self._failed = False
+        self._lines, self._flushed = [",".join(("time", *INPUTS)), RECORDED], perf_counter()
 
     def write(self, time: float, controls: Controls) -> None:
         """The controls from this communication point on, with all digits."""
@@ -160,17 +163,29 @@ class ControlLog:
         self._lines.append(",".join(map(repr, (time, *(controls or ())))))
 
     def _flush(self) -> None:
-        """Raises OSError."""
+        """Raises OSError, once: what is there then must not be written over."""
+        if self._failed:
+            return
         content = "".join(f"{line}\n" for line in self._lines).encode()
-        while content:
-            content = content[self._file.write(content) :]
+        try:
+            if self._file is None:  # what stood there stays until there is something
+                write_whole(self.path, content)
+                self._file, content = FileIO(self.path, "a"), b""
+            while content:
+                content = content[self._file.write(content) :]
+        except OSError as error:
+            self._failed = True
+            raise OSError(error.errno, f"the record ends here ({error.strerror})", str(self.path)) from error
         self._lines, self._flushed = [], perf_counter()
 
     def close(self, how: str) -> None:
         """All is on the disk. Raises OSError where that cannot be done."""
-        with closing(self._file):
-            self._lines.append(f"{ENDED}{how}")
+        self._lines.append(f"{ENDED}{how}")
+        try:
             self._flush()
+        finally:
+            if self._file:
+                self._file.close()
 
 
 class Flight:
