@@ -45,6 +45,7 @@ COMPILED_AGAIN = (
     "x86_64-windows/HovercraftNative.dll",
     "aarch64-darwin/HovercraftNative3.dylib",
     "x86_64-linux/HovercraftFleet.so",
+    "wasm32/HovercraftNative3.wasm",
 )
 """One file of each kind of library: all of them would take as long as an install."""
 

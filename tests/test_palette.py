@@ -1,14 +1,30 @@
 """The colours can be told apart: in greyscale, and by people who see fewer of them."""
 
 import itertools
+import re
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import ImageColor
 
-from hovercraft_fmu.drawing.palette import JETS, METHODS, PORT, SERIES, STARBOARD, WINDOW_JETS
+from hovercraft_fmu.drawing.palette import (
+    FAINT,
+    GRID,
+    GROUND,
+    JETS,
+    METHODS,
+    PANEL,
+    PORT,
+    SERIES,
+    STARBOARD,
+    TEXT,
+    TRAIL,
+    WARNING,
+    WINDOW_JETS,
+)
 from hovercraft_fmu.model.integrators import INTEGRATORS
+from hovercraft_fmu.view.page import FOLDER
 
 Color = NDArray[np.float64]
 XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
@@ -43,6 +59,20 @@ def lab(color: str, kind: str) -> Color:
 def test_what_stands_side_by_side_can_be_told_apart(colors: list[str], kind: str) -> None:
     for a, b in itertools.combinations(colors, 2):
         assert np.linalg.norm(lab(a, kind) - lab(b, kind)) >= LEAST[kind], (a, b)
+
+
+WINDOW = {"ground": GROUND, "grid": GRID, "paper": PANEL, "wake": TRAIL, "ink": TEXT, "faint": FAINT, "thrust": WARNING}
+
+
+def test_the_page_in_the_dark_has_the_colours_of_the_window() -> None:
+    """In light, the sides are those of the pictures."""
+    style = (FOLDER / "page.css").read_text(encoding="utf-8")
+    light, dark = (dict(re.findall(r"--([a-z]+): (#[0-9a-f]+);", block)) for block in style.split("dark) {")[:2])
+    jets = {name: WINDOW_JETS[name] for name in ("port", "starboard")}
+    assert {name: dark[name] for name in (*WINDOW, *jets)} == {**WINDOW, **jets}
+    assert light["port"] == PORT
+    for sides in (light, dark):
+        assert np.linalg.norm(lab(sides["port"], "all") - lab(sides["starboard"], "all")) >= LEAST["all"]
 
 
 def test_every_method_has_a_colour_and_a_marker_of_its_own() -> None:

@@ -4,20 +4,22 @@ import csv
 import itertools
 import re
 import shlex
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Error, Page, expect, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Error, Page, expect
 
+from hovercraft_fmu.fmu.description import NATIVE
 from hovercraft_fmu.fmu.interface import INPUTS, STATES, VARIABLES
 from hovercraft_fmu.fmu.machine_code import BROWSER, NotCompiledError, compile_all
+from hovercraft_fmu.fmu.start_values import variant
 from hovercraft_fmu.host import Fmu
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.view.page import FILE, FOLDER, page
+from tests.browsers import chromium
 from tests.conftest import Built
 from tests.native import STEPS
 from tests.shell import Shell
@@ -45,14 +47,12 @@ def file(built: Built) -> Path:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """Chromium, as the system has it: one for all tests."""
-    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if path is None:
-        pytest.skip("no Chromium")
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
-        yield opened
-        opened.close()
+    """One for all tests."""
+    try:
+        with chromium() as opened:
+            yield opened
+    except FileNotFoundError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture
@@ -363,6 +363,22 @@ def test_the_keyboard_reaches_everything(opened: Opened) -> None:
     made.keyboard.down("ArrowUp")
     made.wait_for_function("hovercraft.page.flight.inputs.thrust > 0")
     assert made.evaluate("hovercraft.page.settings.step_size") == 0.002
+
+
+def test_an_fmu_with_start_values_of_its_own_has_them_on_its_page(
+    opened: Opened, browser: Browser, file: Path, tmp_path: Path
+) -> None:
+    """The module and its description say the same, and the command names the file."""
+    own = tmp_path / FILE
+    own.write_bytes(page(variant(NATIVE, "Heavy", {"mass": 200.0, "integrator": "rk4"})))
+    with browser.new_context() as context:
+        made = context.new_page()
+        made.goto(own.as_uri())
+        expect(made.locator("#about")).to_contain_text("Heavy")
+        assert made.evaluate("hovercraft.page.flight.craft.get('mass').mass") == 200.0
+        assert made.evaluate("hovercraft.page.flight.values") == {"error_estimate": 2, "integrator": 1}
+        assert made.locator("#command").input_value().startswith("hovercraft-fmu simulate Heavy.fmu --input")
+    assert page() == file.read_bytes()  # and the ordinary one is the same when it is made again
 
 
 def test_the_modules_are_one_script(file: Path) -> None:

@@ -297,7 +297,7 @@ export class Camera {
   constructor(canvas, shown) {
     this.canvas = canvas;
     this.wraps = shown.wraps;
-    this.scale = Math.min(Math.max(canvas.width / 320, 2), 5);
+    this.scale = Math.min(Math.max(canvas.width / 260, 2.2), 6);
     this.x = this.wraps ? (0.5 - START[0]) * (canvas.width / this.scale) : shown.craft.x;
     this.y = this.wraps ? (0.5 - START[1]) * (canvas.height / this.scale) : shown.craft.y;
   }

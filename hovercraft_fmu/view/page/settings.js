@@ -98,14 +98,17 @@ export const presetOf = (settings, data) => sceneOf(settings, data)?.preset ?? s
 
 /** Start values of the FMU, but for the state and for what it has anyway. @param {Settings} settings @param {Data} data @param {Description} description */
 export function startValues(settings, data, description) {
+  const terms = data.terms.filter((term) => settings.terms.includes(term.name) && !term.input);
   /** @type {Values} */
-  const values = { ...data.presets[presetOf(settings, data)] };
-  for (const term of data.terms)
-    if (settings.terms.includes(term.name) && !term.input)
-      Object.assign(values, term.values);
-  Object.assign(values, sceneOf(settings, data)?.values, { integrator: description.item("integrator", settings.integrator) });
-  Object.assign(values, settings.integrator === "adaptive" ? { tolerance: settings.tolerance } : { step_size: settings.step_size });
-  return settings.estimate ? { ...values, error_estimate: description.item("error_estimate", "on") } : values;
+  const values = Object.assign({}, ...terms.map((term) => term.values), sceneOf(settings, data)?.values);
+  values.integrator = description.item("integrator", settings.integrator);
+  values.error_estimate = description.item("error_estimate", settings.estimate ? "on" : "off");
+  if (settings.integrator === "adaptive")
+    values.tolerance = settings.tolerance;
+  else
+    values.step_size = settings.step_size;
+  const changed = Object.entries(values).filter(([name, value]) => value !== description.variable(name).start);
+  return { ...data.presets[presetOf(settings, data)], ...Object.fromEntries(changed) };
 }
 
 /** The command that replays the log. @param {Values} values @param {Settings} settings @param {Data} data @param {Description} description @param {number} step s */
