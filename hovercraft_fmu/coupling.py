@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .autopilot.guidance import Commands, Orders, Sight, Waypoint, beginning, steer
 from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, ORDERS
 from .building import default_fmu
-from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, INPUTS, STATES
+from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, STATES, WIND
 from .fmu.near_names import did_you_mean, must_be_one_of
 from .host import Fmu, Instance
 from .model.craft import Craft
@@ -27,7 +27,6 @@ JACOBI, GAUSS_SEIDEL = SCHEMES = ("jacobi", "gauss_seidel")
 with what the autopilot shows after its step."""
 OUTPUTS = tuple(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output")
 COLUMNS = ("time", *STATES, *OUTPUTS)
-WIND = INPUTS[3:]
 START_VALUES = (*CRAFT_PARAMETERS, *STATES, *WIND)
 """Of the hovercraft: what a voyage may set."""
 TOLD = tuple(name for name in ORDERS if name in CRAFT_PARAMETERS)

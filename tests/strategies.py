@@ -55,8 +55,12 @@ states = st.builds(
     yaw_rate=numbers(-2.0, 2.0),
 )
 COMMANDS = {"thrust": numbers(-200.0, 200.0), "port": numbers(-0.5, 1.5), "starboard": numbers(-0.5, 1.5)}
-calm_controls = st.builds(Controls, **COMMANDS, wind_x=st.just(0.0), wind_y=st.just(0.0))
-"""In air at rest."""
-controls = st.one_of(
-    calm_controls, st.builds(Controls, **COMMANDS, wind_x=numbers(-10.0, 10.0), wind_y=numbers(-10.0, 10.0))
-)
+WIND = {"wind_x": numbers(-10.0, 10.0), "wind_y": numbers(-10.0, 10.0)}
+LOAD = {
+    "external_force_x": numbers(-200.0, 200.0),
+    "external_force_y": numbers(-200.0, 200.0),
+    "external_moment": numbers(-2000.0, 2000.0),
+}
+calm_controls = st.builds(Controls, **COMMANDS)
+"""In air at rest, and with no load from outside."""
+controls = st.one_of(calm_controls, st.builds(Controls, **COMMANDS, **WIND), st.builds(Controls, **COMMANDS, **WIND, **LOAD))

@@ -126,7 +126,8 @@ def test_a_mirrored_scene_gives_the_mirrored_path_to_the_bit(craft: Craft, state
     def mirrored(s: State) -> State:
         return State(s.x, -s.y, -s.heading, s.vx, -s.vy, -s.yaw_rate)
 
-    swapped = Controls(asked.thrust, asked.starboard, asked.port, asked.wind_x, -asked.wind_y)
+    thrust, port, starboard, wind_x, wind_y, force_x, force_y, moment = asked
+    swapped = Controls(thrust, starboard, port, wind_x, -wind_y, force_x, -force_y, -moment)
     there = advance(state, asked, craft, 0.05).state
     back = advance(mirrored(state), swapped, craft, 0.05).state
     assert mirrored(back) == there
@@ -139,9 +140,11 @@ def test_turning_the_scene_turns_the_path(state: State, asked: Controls, angle: 
         velocity = complex(s.vx, s.vy) * complex(math.cos(angle), math.sin(angle))
         return State(position.real, position.imag, s.heading + angle, velocity.real, velocity.imag, s.yaw_rate)
 
-    wind = complex(asked.wind_x, asked.wind_y) * complex(math.cos(angle), math.sin(angle))
+    turn = complex(math.cos(angle), math.sin(angle))
+    wind, force = complex(*asked[3:5]) * turn, complex(*asked[5:7]) * turn
     there = advance(state, asked, Craft(), 0.05).state
-    other = advance(turned(state), asked._replace(wind_x=wind.real, wind_y=wind.imag), Craft(), 0.05).state
+    turned_controls = Controls(*asked[:3], wind.real, wind.imag, force.real, force.imag, asked.external_moment)
+    other = advance(turned(state), turned_controls, Craft(), 0.05).state
     assert other == pytest.approx(turned(there), rel=0.0, abs=1e-11)  # positions to 1e3 m: 1e-13 a rounding
 
 

@@ -32,9 +32,11 @@ TERMS: dict[str, dict[str, float]] = {
     "friction": {"skirt_friction": 0.003},
     "no drag": {"drag_coefficient": 0.0},
     "wind": {},
+    "load": {},
 }
 
 SLOPES = {"held": Controls(0.0), "thrusters": Controls(0.7, 0.2, -0.1), "wind": Controls(0.7, 0.2, -0.1, 0.05, 0.0)}
+SLOPES["load"] = Controls(0.0, external_force_x=0.3, external_force_y=-0.2, external_moment=2.0)
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +85,8 @@ def test_each_craft_has_the_bits_of_the_native_fmu(term: str, method: str, slope
     states, controls, crafts = drawn(43, seed=len(term), **TERMS[term])
     if term == "wind":
         controls = [each._replace(wind_x=0.2, wind_y=-0.1) for each in controls]
+    if term == "load":
+        controls = [Controls(*each[:5], 3.0, -2.0, 25.0) for each in controls]
     way = Settings(STEPS[method], METHODS[method], 1e-6)
     found = advance_fleet(columns(states), columns(controls), crafts, 0.73, way, slope)
     expected = [

@@ -201,7 +201,8 @@ def test_extremes_end_in_the_same_way(name: str, method: str, libm: Kernel) -> N
 # ---- ramps, which the Python model does not have
 
 
-RAMP, START = Controls(1.5, 0.2, -0.1, 0.3, -0.2), Controls(9.0, 0.1, 0.6, -0.1, 0.2)
+RAMP = Controls(1.5, 0.2, -0.1, 0.3, -0.2, -1.0, 2.0, 20.0)
+START = Controls(9.0, 0.1, 0.6, -0.1, 0.2, 0.0, -3.0, -40.0)
 
 
 @pytest.mark.parametrize(
@@ -233,7 +234,8 @@ def test_higher_methods_are_exact_on_a_ramp_of_thrust(method: str, libm: Kernel)
 
 def test_rk4_keeps_its_order_on_ramps(libm: Kernel) -> None:
     """The slope of the error against the step; the ramps stay inside their limits."""
-    rates, held = Controls(1.0, 0.2, -0.1, 0.02, -0.01), Controls(2.0, 0.1, 0.5, 0.05, 0.1)
+    rates = Controls(1.0, 0.2, -0.1, 0.02, -0.01, -1.0, 2.0, 20.0)
+    held = Controls(2.0, 0.1, 0.5, 0.05, 0.1, 0.0, -3.0, -40.0)
     start = State(vx=0.3, vy=-0.1, yaw_rate=0.1)
 
     def end(h: float) -> NDArray[np.float64]:

@@ -52,6 +52,7 @@ def test_the_general_equations_have_the_bits_of_the_special_ones(craft: Craft, s
     factors, motion = (0.001 / craft.mass, 0.001 / craft.inertia), state[2:]
     plain = load_function(asked, craft, *factors)(*motion)
     assert load_function(asked._replace(wind_x=5e-324), craft, *factors)(*motion) == plain
+    assert load_function(asked._replace(external_moment=5e-324), craft, *factors)(*motion) == plain
     still, nearly = (replace(craft, drag_coefficient=coefficient) for coefficient in (0.0, 1e-300))
     without, with_it = (load_function(asked, each, *factors)(*motion) for each in (still, nearly))
     assert without[:3] == with_it[:3]

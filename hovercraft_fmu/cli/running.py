@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 @click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
 @click.option(
     "--input", "log", metavar="FILE.csv", type=PathOf(path_type=Path),
-    help="A control log: columns time, thrust, port_thruster, starboard_thruster, wind.x, wind.y (one left out holds "
-    "its start value); linear between rows, two rows at one time are a jump.",
+    help="A control log: columns time, thrust, port_thruster, starboard_thruster, wind.x, wind.y, external.force.x, "
+    "external.force.y, external.moment (one left out holds its start value); linear between rows, two rows at one time "
+    "are a jump.",
 )  # fmt: skip
 @click.option("--preset", metavar="NAME", help=f"A craft: {', '.join(PRESETS)}.")
 @click.option("--start-time", type=float, metavar="S", help="Default: the first time of the inputs.")

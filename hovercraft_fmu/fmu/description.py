@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from .._version import RELEASE_DATE, __version__
 from ..model.error_estimate import OFF
 from .block import guid
-from .interface import CRAFT_PARAMETERS, DERIVATIVES, HOVERCRAFT, INPUTS, STATES, TIME
+from .interface import CRAFT_PARAMETERS, DERIVATIVES, EXTERNAL, HOVERCRAFT, INPUTS, STATES, TIME
 from .variable import Kind, Model, Variable
 
 AUTHOR = "The hovercraft-fmu authors"
@@ -301,14 +301,16 @@ def _place(name: str, flavour: Flavour) -> str:
 
 def _followed(acceleration: str, flavour: Flavour) -> tuple[str, ...]:
     """The states and inputs that an acceleration follows, and in FMI 3.0 the tunable parameters; thrust has no moment,
-    rotational drag is one.
+    rotational drag is one; a load from outside is along one of them.
     """
     turns = acceleration == "acceleration.yaw"
     tunable = [
         v.name for v in flavour.model.variables if v.name in CRAFT_PARAMETERS and v.variability == "tunable"
     ] if flavour.fmi == 3 else []  # fmt: skip
     names = (*INPUTS, "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate", *tunable)
-    others = ("thrust", "thrust_min", "thrust_max") if turns else ("rotational_drag",)
+    force = f"external.force.{acceleration[-1]}"
+    own = ("external.moment", "rotational_drag") if turns else (force, "thrust", "thrust_min", "thrust_max")
+    others = {*EXTERNAL, "thrust", "thrust_min", "thrust_max", "rotational_drag"} - {*own}
     return tuple(name for name in names if name not in others)
 
 

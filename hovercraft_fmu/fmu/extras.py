@@ -5,11 +5,9 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 from .description import Flavour, xml
-from .interface import INPUTS
+from .interface import ACTUATORS, EXTERNAL
 from .variable import Model
 
-ACTUATORS = tuple(name for name in INPUTS if "." not in name)
-"""The craft's commands: the terminal of that name."""
 LS_REF, LS_MANIFEST = "org.fmi-standard.fmi-ls-ref", "http://fmi-standard.org/fmi-ls-manifest"
 register_namespace("fmi-ls", LS_MANIFEST)
 RESULT = Path(__file__).parent / "extra" / "out.csv"
@@ -41,13 +39,16 @@ def build_description(flavour: Flavour, options: Iterable[str]) -> Element:
 def terminals(model: Model) -> dict[str, dict[str, str]]:
     """Terminal -> member -> variable: inputs and outputs that belong together, what a host may connect at once.
 
-    By the scheme that FMI 3.0.2 suggests (2.4.9.2) a variable is named TERMINAL.MEMBER; and there are the commands.
+    By the scheme that FMI 3.0.2 suggests (2.4.9.2) a variable is named TERMINAL.MEMBER; and there are the commands, and
+    the load from outside.
     """
     found: dict[str, dict[str, str]] = {}
     for variable in model.variables:
         terminal, _, member = variable.name.rpartition(".")
         if variable.name in ACTUATORS:
             terminal, member = "actuators", variable.name
+        elif variable.name in EXTERNAL:
+            terminal, member = "load", variable.name.removeprefix("external.")
         if terminal and variable.causality in ("input", "output"):
             found.setdefault(terminal, {})[member] = variable.name
     return found

@@ -166,6 +166,13 @@ VARIABLES: tuple[Variable, ...] = (
              f"error_estimate is off, {LARGEST:.0e} where there is none", minimum=0.0, maximum=LARGEST),
     Variable(50, "error.heading", "output", "discrete", "rad", None,
              "Estimated distance of the heading from it, in the same way", minimum=0.0, maximum=LARGEST),
+    # -- what else a scene has, from outside
+    Variable(51, "external.force.x", "input", "continuous", "N", 0.0,
+             "Force from outside (a slope, a wall, a line), world frame, through the centre of gravity"),
+    Variable(52, "external.force.y", "input", "continuous", "N", 0.0,
+             "Force from outside, world frame, down the screen, through the centre of gravity"),
+    Variable(53, "external.moment", "input", "continuous", "N.m", 0.0,
+             "Moment from outside about the centre of gravity, positive to starboard"),
 )  # fmt: skip
 
 TIME = Variable(1000, "time", "independent", "continuous", "s", None, "Simulation time")
@@ -173,7 +180,11 @@ TIME = Variable(1000, "time", "independent", "continuous", "s", None, "Simulatio
 
 BY_NAME: Mapping[str, Variable] = MappingProxyType({variable.name: variable for variable in VARIABLES})
 
-INPUTS = ("thrust", "port_thruster", "starboard_thruster", "wind.x", "wind.y")
+ACTUATORS = ("thrust", "port_thruster", "starboard_thruster")
+"""They have limits."""
+WIND = ("wind.x", "wind.y")
+EXTERNAL = ("external.force.x", "external.force.y", "external.moment")
+INPUTS = (*ACTUATORS, *WIND, *EXTERNAL)
 """In the order of Controls."""
 STATES = ("pose.x", "pose.y", "pose.heading", "velocity.x", "velocity.y", "velocity.yaw_rate")
 """In the order of State."""

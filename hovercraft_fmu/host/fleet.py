@@ -25,6 +25,7 @@ Rows: TypeAlias = ArrayLike | Sequence[ArrayLike]
 """One row a quantity: an array of shape (quantities, craft), or a sequence of rows; a row is of shape (craft,), or one
 number that all craft share."""
 PARAMETERS = tuple(field.name for field in fields(Craft))
+LOAD = Controls._fields[5:]
 
 
 class Fleet(NamedTuple):
@@ -136,16 +137,17 @@ def advance_fleet(
     """Many craft, each one communication step later, with the bits of the native FMU; Python's lock is released.
 
     A row of `float64`, whatever its strides, is read where it is; nothing is written into what is given. Eight craft go
-    side by side where drag is plain (no wind, constant area, no friction, no rotational drag) and the method
-    semi-implicit Euler or RK4; the others one after the other.
+    side by side where drag is plain (no wind, constant area, no friction, no rotational drag), no load comes from
+    outside and the method is semi-implicit Euler or RK4; the others one after the other.
 
     Args:
         states: see `Rows`; 6 of them, in the order of State: m, rad, m/s, rad/s.
-        controls: 5 rows, in the order of Controls: N, 1, 1, m/s, m/s; each craft holds them inside its limits.
+        controls: 8 rows, in the order of Controls: N, 1, 1, m/s, m/s, N, N, N.m; or 5, without loads from outside. Each
+            craft holds them inside its limits.
         crafts: the constants of each; `Crafts` are checked only once.
         communication_step: s, of each craft, or one for all.
         settings: method, sub-step [s] and tolerance; the latter two may be arrays of shape (craft,), too.
-        slopes: 5 rows, per s: how the controls change over the step, from its start; None: they hold.
+        slopes: as many rows, per s: how the controls change over the step, from its start; None: they hold.
         proposed: s; what the last call with the adaptive method returned, 0 at the start.
 
     Raises:
@@ -252,7 +254,7 @@ class _Column(Structure):
 
 class _CFleet(Structure):
     _fields_ = [
-        ("count", c_int64), ("states", _Column * 6), ("controls", _Column * 5), ("slopes", _Column * 5),
+        ("count", c_int64), ("states", _Column * 6), ("controls", _Column * 8), ("slopes", _Column * 8),
         ("constants", _Column * 15),
     ]  # fmt: skip
 
@@ -276,6 +278,8 @@ TOO_MANY, RUNAWAY, TOO_SMALL = range(1, 4)
 
 def _rows(name: str, given: Rows, quantities: Sequence[str]) -> list[Array]:
     rows = list(given) if isinstance(given, Sequence) else list(np.atleast_1d(given))
+    if len(rows) == len(quantities) - len(LOAD) and quantities[-1].endswith(LOAD[-1]):
+        rows += [0.0] * len(LOAD)
     if len(rows) != len(quantities):
         raise ValueError(f"{name}: {len(rows)} rows: must be {len(quantities)}, one for each quantity")
     return [_column(quantity, row) for quantity, row in zip(quantities, rows, strict=True)]

@@ -40,6 +40,12 @@ class Controls(NamedTuple):
     """m/s, world frame: the velocity of the air"""
     wind_y: float = 0.0
     """m/s, world frame"""
+    external_force_x: float = 0.0
+    """N, world frame: of what else a scene has, through the centre of gravity"""
+    external_force_y: float = 0.0
+    """N, world frame"""
+    external_moment: float = 0.0
+    """N.m, about the centre of gravity"""
 
 
 class Loads(NamedTuple):
@@ -82,8 +88,7 @@ def saturate(controls: Controls, craft: Craft) -> Controls:
         _clip(controls.thrust, craft.thrust_min, craft.thrust_max),
         _clip(controls.port, 0.0, 1.0),
         _clip(controls.starboard, 0.0, 1.0),
-        controls.wind_x,
-        controls.wind_y,
+        *controls[3:],
     )
 
 
@@ -93,13 +98,18 @@ def _clip(value: float, low: float, high: float) -> float:
 
 def actuation(controls: Controls, craft: Craft) -> tuple[float, float, float]:
     """Thrust [N], side force of both bow thrusters [N, to starboard] and their moment [N.m], after saturation."""
-    thrust, port, starboard, _, _ = saturate(controls, craft)
+    thrust, port, starboard = saturate(controls, craft)[:3]
     return thrust, craft.steering_force * (port - starboard), craft.thruster_moment * (port - starboard)
 
 
 def windy(controls: Controls) -> bool:
     """Whether the air moves."""
     return controls.wind_x != 0.0 or controls.wind_y != 0.0
+
+
+def pushed(controls: Controls) -> bool:
+    """Whether there are loads from outside."""
+    return controls.external_force_x != 0.0 or controls.external_force_y != 0.0 or controls.external_moment != 0.0
 
 
 def load_function(controls: Controls, craft: Craft, per_mass: float = 1.0, per_inertia: float = 1.0) -> LoadFunction:
@@ -114,10 +124,26 @@ def load_function(controls: Controls, craft: Craft, per_mass: float = 1.0, per_i
     with the bits of the general one.
     """
     if craft.drag_factor == 0.0:
-        return _without_drag(controls, craft, per_mass, per_inertia)
-    if craft.plain_drag and not windy(controls):
-        return _with_plain_drag(controls, craft, per_mass, per_inertia)
-    return _with_any_drag(controls, craft, per_mass, per_inertia)
+        own = _without_drag(controls, craft, per_mass, per_inertia)
+    elif craft.plain_drag and not windy(controls):
+        own = _with_plain_drag(controls, craft, per_mass, per_inertia)
+    else:
+        own = _with_any_drag(controls, craft, per_mass, per_inertia)
+    return _with_external_loads(own, controls, per_mass, per_inertia) if pushed(controls) else own
+
+
+def _with_external_loads(
+    own: LoadFunction, controls: Controls, per_mass: float, per_inertia: float
+) -> LoadFunction:
+    """And those from outside, which are in the world frame already."""
+    force_x, force_y = controls.external_force_x * per_mass, controls.external_force_y * per_mass
+    external_moment = controls.external_moment * per_inertia
+
+    def loads_at(heading: float, vx: float, vy: float, yaw_rate: float) -> tuple[float, float, float, float]:
+        x, y, moment, kq = own(heading, vx, vy, yaw_rate)
+        return x + force_x, y + force_y, moment + external_moment, kq
+
+    return loads_at
 
 
 def _pushes(controls: Controls, craft: Craft, per_mass: float, per_inertia: float) -> tuple[float, float, float]:
@@ -311,7 +337,7 @@ def friction_function(craft: Craft, h: float) -> Friction:
 
 
 def loads(state: State, controls: Controls, craft: Craft) -> Loads:
-    """Force [N, world frame] and moment [N.m] on the craft: thrust, bow thrusters, air drag and friction."""
+    """Force [N, world frame] and moment [N.m] on the craft: thrust, bow thrusters, air drag, loads from outside, friction."""
     if not craft.rubs:
         return Loads(*load_function(controls, craft)(*state[2:])[:3])
     if state.vx == 0.0 and state.vy == 0.0 and state.yaw_rate == 0.0:

@@ -16,6 +16,7 @@ from .dynamics import (
     friction_gains,
     friction_radius,
     load_function,
+    pushed,
     sliding_load_function,
     slip_speed,
     windy,
@@ -55,7 +56,7 @@ def semi_implicit_euler(state: State, controls: Controls, craft: Craft, h: float
     First order; friction is an implicit step of its own, between the two. The loop holds plain numbers: an object made
     at every sub-step would cost more than the physics.
     """
-    if craft.drag_factor and craft.plain_drag and not craft.rubs and not windy(controls):
+    if craft.drag_factor and craft.plain_drag and not (craft.rubs or windy(controls) or pushed(controls)):
         return _plain_euler(state, controls, craft, h, n)
     push_at = load_function(controls, craft, h / craft.mass, h / craft.inertia)
     rubbed = friction_function(craft, h) if craft.rubs else None
@@ -136,13 +137,17 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
     v' - v m/(m + g) = ((I + g x_d^2) h side + g x_d (x_d g v m/(m + g) - b))/D.
 
     In wind the same holds of the velocity through the air, which is what drag takes away. A moment of the rotation
-    itself, -d r |r|, adds h d |r| to I on the left side. Friction is an implicit step of its own, after it.
+    itself, -d r |r|, adds h d |r| to I on the left side. A force from outside, turned into the body frame, is a part of
+    T and of the side force, and a moment one of the turn. Friction is an implicit step of its own, after it.
     """
     loads_at = load_function(controls, craft)
     rubbed = friction_function(craft, h) if craft.rubs else None
     in_wind, spins = windy(controls), craft.rotational_drag != 0.0
     wind_x, wind_y, spin = controls.wind_x, controls.wind_y, craft.spin_drag_factor
     thrust, side, turn = actuation(controls, craft)
+    loaded, force_x, force_y = pushed(controls), controls.external_force_x, controls.external_force_y
+    turn = turn + controls.external_moment if loaded else turn
+    ahead, abeam, scene = thrust, side, in_wind or spins or loaded
     cos, sin = math.cos, math.sin
     mass, inertia, x_d = craft.mass, craft.inertia, craft.drag_center
     damped, arm, square = inertia, mass * x_d * x_d, x_d * x_d
@@ -157,17 +162,20 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
         c = cos(heading)
         s = sin(heading)
         g = h * kq
-        if in_wind:
-            vx, vy = vx - wind_x, vy - wind_y
-        if spins:
-            damped = inertia + h * spin * abs(yaw_rate)
+        if scene:
+            if in_wind:
+                vx, vy = vx - wind_x, vy - wind_y
+            if spins:
+                damped = inertia + h * spin * abs(yaw_rate)
+            if loaded:
+                ahead, abeam = thrust + (c * force_x + s * force_y), side + (c * force_y - s * force_x)
         v = c * vy - s * vx
         b = inertia * yaw_rate + h * turn
-        e = x_d * (mass * v + h * side) - b
+        e = x_d * (mass * v + h * abeam) - b
         determinant = mass * damped + g * (damped + arm)
         kept = mass / (mass + g)
-        surge = h * thrust / (mass + g)
-        sway = ((damped + g * square) * (h * side) + g * x_d * (x_d * (g * kept) * v - b)) / determinant
+        surge = h * ahead / (mass + g)
+        sway = ((damped + g * square) * (h * abeam) + g * x_d * (x_d * (g * kept) * v - b)) / determinant
         yaw_rate = (mass * b - g * e) / determinant
         vx = kept * vx + (c * surge - s * sway)
         vy = kept * vy + (s * surge + c * sway)

@@ -67,10 +67,15 @@ def advanced(batch: Batch, method: Integrator, state: State, n: int, refined: in
     return State(*fleet.states), fleet.stability, fleet.rotation
 
 
-def pushes(batch: Batch) -> tuple[Array, Array, Array]:
-    """Thrust [N], side force [N] and moment [N.m] of the thrusters: what is drawn is inside its limits."""
-    command = batch.controls.port - batch.controls.starboard
-    return batch.controls.thrust, batch.craft.steering_force * command, batch.craft.thruster_moment * command
+def pushes(batch: Batch) -> tuple[Array, Array]:
+    """Force [N] and moment [N.m], by size and at most: of thrust and thrusters, which are drawn inside their limits, and
+    from outside.
+    """
+    controls, craft = batch.controls, batch.craft
+    command = controls.port - controls.starboard
+    outside = np.hypot(controls.external_force_x, controls.external_force_y)
+    force = np.hypot(controls.thrust, craft.steering_force * command) + outside
+    return force, np.abs(craft.thruster_moment * command) + np.abs(controls.external_moment)
 
 
 # ---- the numbers of the measurement
@@ -95,12 +100,12 @@ ROUNDING = 1e-11
 
 def own_steps(rng: np.random.Generator, runs: Batch) -> Array:
     """s: 1e-5 to 3 times the time in which the craft's motion changes, at most 10 s."""
-    thrust, side, turn = pushes(runs)
+    push, turn = pushes(runs)
     craft, k = runs.craft, runs.craft.drag_factor
-    force = np.abs(thrust) + np.abs(side) + np.abs(turn / craft.length)
+    force = push + turn / craft.length
     # drag at the speed of the start and at the terminal speed, rotation now and by the thrusters
     drag = craft.drag_rate * (observe_fleet(runs.start, runs.controls, craft)[5] + np.sqrt(k * force))
-    rotation = np.abs(runs.start.yaw_rate) + np.sqrt(np.abs(turn) / craft.inertia)
+    rotation = np.abs(runs.start.yaw_rate) + np.sqrt(turn / craft.inertia)
     return np.minimum(_logarithmic(rng, 1e-5, 3.0, len(runs.h)) / (drag + rotation + 1e-6), 10.0)
 
 
@@ -141,7 +146,12 @@ def sample(rng: np.random.Generator, count: int, substeps: int, sampling: str) -
         areas, spins, friction = rng.integers(1, 3, count), command(0.4), spread(1e-6, 10.0, 0.4)
         parameters |= {"drag_area": areas, "rotational_drag": spins, "skirt_friction": friction}
         blows, from_where = spread(1e-6, 1e6, 0.4), 2.0 * np.pi * command(0.0)
-        controls = controls._replace(wind_x=blows * np.cos(from_where), wind_y=blows * np.sin(from_where))
+        pushes_with, where_to, turn = spread(1e-3, 1e9, 0.4), 2.0 * np.pi * command(0.0), spread(1e-3, 1e9, 0.4)
+        controls = controls._replace(
+            wind_x=blows * np.cos(from_where), wind_y=blows * np.sin(from_where),
+            external_force_x=pushes_with * np.cos(where_to), external_force_y=pushes_with * np.sin(where_to),
+            external_moment=turn * rng.choice([-1.0, 1.0], count),
+        )  # fmt: skip
     runs = made(Crafts(**parameters), controls, start, np.ones(count), substeps)
     return runs._replace(h=SAMPLINGS[sampling](rng, runs))
 
@@ -183,7 +193,7 @@ def watched(runs: Batch, method: Integrator) -> Numbers:
 def _swing(runs: Batch, drag: Array) -> Array:
     """1: tau, from a bound of h*k*q [kg]; k*q^2 = (k*q)^2/k, and without drag nothing."""
     craft, k = runs.craft, runs.craft.drag_factor
-    turn = np.abs(pushes(runs)[2])
+    turn = pushes(runs)[1]
     least = np.where(craft.drag_area == DIRECTIONAL, np.fmin(craft.drag_factor_ahead, craft.drag_factor_abeam), k)
     pressure = np.divide(drag * drag, least, out=np.zeros_like(drag), where=k > 0.0)
     return (np.abs(craft.drag_center) * pressure + runs.h * runs.h * turn) / craft.inertia
@@ -195,10 +205,10 @@ def _size(vx: Any, vy: Any, yaw_rate: Any, craft: Crafts) -> Array:
 
 
 def _gain(runs: Batch) -> Array:
-    """m/s: what thrust and thrusters add to the speed in a sub-step."""
-    thrust, side, turn = pushes(runs)
+    """m/s: what thrust, thrusters and loads from outside add to the speed in a sub-step."""
+    force, turn = pushes(runs)
     craft = runs.craft
-    return runs.h * _size(thrust / craft.mass, side / craft.mass, turn / craft.inertia, craft)
+    return runs.h * _size(force / craft.mass, 0.0, turn / craft.inertia, craft)
 
 
 def _grip(runs: Batch) -> Array:

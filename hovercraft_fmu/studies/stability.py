@@ -25,8 +25,9 @@ THE EXTREMES. Random craft, far beyond the sensible. N sub-steps of h; the large
 
     sigma = h*2*k*q*(1/m + x_d^2/I)        drag: the stability number (rotational drag d*r*|r| adds h*2*d*|r|/I)
     rho = h*|r|                            rotation in a sub-step
-    tau = h^2*(k*q^2*|x_d| + |turn|)/I     what the air, were it abeam, and the thrusters' moment (turn) can add to it
-    alpha = h*(gain of speed by thrust and thrusters)/V
+    tau = h^2*(k*q^2*|x_d| + |turn|)/I     what the air, were it abeam, and the moment (turn) of the thrusters and from
+                                           outside can add to it
+    alpha = h*(gain of speed by thrust, thrusters and loads from outside)/V
     phi   = h*(loss of speed by friction)/V
 
 wherever the loads are worked out (RK4's stages, too) and at the end, and V, the largest speed of the centre of gravity,

@@ -12,7 +12,7 @@ from ..drawing.figures import new_figure
 from ..drawing.palette import METHODS
 from ..fmu.interface import INPUTS, OUTPUTS, STATES
 from ..host import Instance
-from ..model.dynamics import Controls, State, windy
+from ..model.dynamics import Controls, State
 from ..model.subcycling import advance, meant_step
 from ..scenes import SCENES, Scene
 from ..simulation import Run, held_steps, holding, method_in_words, metres, plan, schedule
@@ -112,8 +112,8 @@ def bare(run: Run, points: Points) -> Ready[Reached]:
 
 
 def through(instance: Instance, run: Run, points: Points) -> Ready[Reached]:
-    """The whole run through fmpy: three inputs (in wind, five), a step, the outputs at every communication point."""
-    driven = INPUTS if any(windy(controls) for _, _, controls in points) else INPUTS[:3]
+    """The whole run through fmpy: three inputs (in wind, and with loads from outside, all), a step, the outputs at every communication point."""
+    driven = INPUTS if any(any(controls[3:]) for _, _, controls in points) else INPUTS[:3]
     inputs, outputs, states = instance.port(*driven), instance.port(*OUTPUTS), instance.port(*STATES)
     steps = [(time, end - time, controls[: len(driven)]) for time, end, controls in points]
 

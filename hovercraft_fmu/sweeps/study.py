@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.stats import qmc
 
-from ..fmu.interface import BY_NAME, INPUTS
+from ..fmu.interface import BY_NAME, EXTERNAL, INPUTS, WIND
 from ..fmu.near_names import beside, did_you_mean, must_be_one_of
 from ..fmu.start_values import start_value
 from ..model.craft import Craft, check_parameter
@@ -208,7 +208,7 @@ def _source(table: Mapping[str, Any], folder: Path) -> _Source:
     if name.endswith(".csv"):
         raise ValueError(f"scene = {name!r}: must be the name of a scene; a control log is given as inputs")
     run = plan(name)
-    still = {each for each in ("wind.x", "wind.y") if not run.signals[each].any()}
+    still = {each for each in (*WIND, *EXTERNAL) if not run.signals[each].any()}
     return _Source(name, name, tuple(each for each in INPUTS if each not in still), None)
 
 

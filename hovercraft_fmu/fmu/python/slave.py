@@ -1,6 +1,7 @@
 """The hovercraft as a PythonFMU slave."""
 
 import math
+from operator import itemgetter
 from typing import Any, NoReturn
 
 from ...model.craft import Craft, check_parameter
@@ -39,7 +40,7 @@ from ..variable import Variable
 from .life_cycle import Slave, refuse_non_finite
 from .wrapper import Fmi2Status
 
-THRUST, PORT, STARBOARD, WIND_X, WIND_Y = (BY_NAME[name].reference for name in INPUTS)
+inputs_of = itemgetter(*(BY_NAME[name].reference for name in INPUTS))
 STATE_REFERENCES = tuple(BY_NAME[name].reference for name in STATES)
 MOTION_REFERENCES = tuple(BY_NAME[name].reference for name in (*STATES, *MOTION))
 ERROR_REFERENCES = tuple(BY_NAME[name].reference for name in ERRORS)
@@ -204,8 +205,7 @@ class HovercraftSlave(Slave):
         return Craft(**values)
 
     def _make_controls(self) -> Controls:
-        given = self._given
-        return Controls(given[THRUST], given[PORT], given[STARBOARD], given[WIND_X], given[WIND_Y])
+        return Controls(*inputs_of(self._given))
 
     def _take_up_settings(self) -> None:
         tolerance = self._given[TOLERANCE] if self._hosts_tolerance is None else self._hosts_tolerance

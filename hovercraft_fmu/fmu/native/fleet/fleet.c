@@ -56,13 +56,10 @@ static struct controls controls_at(const struct column *columns, int64_t i)
 
 static struct drive drive_at(const struct fleet *fleet, int64_t i)
 {
-    const struct controls rate = controls_at(fleet->slopes, i);
-    return (struct drive){
-        .start = controls_at(fleet->controls, i),
-        .rate = rate,
-        .varies = rate.thrust != 0.0 || rate.port != 0.0 || rate.starboard != 0.0 || rate.wind_x != 0.0 ||
-                  rate.wind_y != 0.0,
-    };
+    struct drive drive = {.start = controls_at(fleet->controls, i), .rate = controls_at(fleet->slopes, i)};
+    for (int k = 0; k < FLEET_CONTROLS; k++)
+        drive.varies = drive.varies || of(&fleet->slopes[k], i) != 0.0;
+    return drive;
 }
 
 static bool are_finite(const struct column *columns, int n, int64_t i)

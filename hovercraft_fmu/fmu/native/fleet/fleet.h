@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-enum { FLEET_STATES = 6, FLEET_CONTROLS = 5, FLEET_CONSTANTS = 15 };
+enum { FLEET_STATES = 6, FLEET_CONTROLS = 8, FLEET_CONSTANTS = 15 };
 
 /* One quantity: of craft i it is values[i * stride]; stride 0 where all have the same. */
 struct column {

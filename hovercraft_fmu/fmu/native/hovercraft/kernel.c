@@ -142,13 +142,11 @@ static double clip(double value, double low, double high)
 
 struct controls kernel_saturate(const struct controls *controls, const struct craft *craft)
 {
-    return (struct controls){
-        .thrust = clip(controls->thrust, craft->thrust_min, craft->thrust_max),
-        .port = clip(controls->port, 0.0, 1.0),
-        .starboard = clip(controls->starboard, 0.0, 1.0),
-        .wind_x = controls->wind_x,
-        .wind_y = controls->wind_y,
-    };
+    struct controls held = *controls;
+    held.thrust = clip(controls->thrust, craft->thrust_min, craft->thrust_max);
+    held.port = clip(controls->port, 0.0, 1.0);
+    held.starboard = clip(controls->starboard, 0.0, 1.0);
+    return held;
 }
 
 double kernel_steering(const struct controls *controls, const struct craft *craft)
@@ -169,6 +167,9 @@ struct controls kernel_controls_at(const struct drive *drive, double time)
         .starboard = drive->start.starboard + time * drive->rate.starboard,
         .wind_x = drive->start.wind_x + time * drive->rate.wind_x,
         .wind_y = drive->start.wind_y + time * drive->rate.wind_y,
+        .external_force_x = drive->start.external_force_x + time * drive->rate.external_force_x,
+        .external_force_y = drive->start.external_force_y + time * drive->rate.external_force_y,
+        .external_moment = drive->start.external_moment + time * drive->rate.external_moment,
     };
 }
 
@@ -179,6 +180,17 @@ static bool is_windy(const struct drive *drive)
     return drive->ask || start->wind_x != 0.0 || start->wind_y != 0.0 || rate->wind_x != 0.0 || rate->wind_y != 0.0;
 }
 
+static bool has_external_load(const struct controls *controls)
+{
+    return controls->external_force_x != 0.0 || controls->external_force_y != 0.0 || controls->external_moment != 0.0;
+}
+
+/* Whether there are loads from outside, now or later in the step, or could be. */
+static bool is_pushed(const struct drive *drive)
+{
+    return drive->ask || has_external_load(&drive->start) || has_external_load(&drive->rate);
+}
+
 enum drag_kind { WITHOUT_DRAG, PLAIN_DRAG, ANY_DRAG };
 
 /* All that the loads need and that does not change from sub-step to sub-step; `steer` renews the controls' part. Forces
@@ -186,6 +198,7 @@ enum drag_kind { WITHOUT_DRAG, PLAIN_DRAG, ANY_DRAG };
 struct load_function {
     enum drag_kind kind;
     bool slides; /* friction is one of the loads */
+    bool pushed; /* and loads from outside */
     bool directional;
     double per_mass, per_inertia;
     double k;                  /* kg/m; with the directional area 1, as q then has the two factors in it */
@@ -197,6 +210,7 @@ struct load_function {
     double radius;             /* m: of friction */
     double thrust, side, turn;
     double wind_x, wind_y;     /* m/s */
+    double external_x, external_y, external_moment;
     double begun;              /* s: where in the communication step its time 0 is */
     const struct craft *craft;
     const struct drive *drive;
@@ -211,6 +225,9 @@ static void steer(struct load_function *f, const struct controls *controls)
     f->turn = thruster_moment(f->craft) * (held.port - held.starboard) * f->per_inertia;
     f->wind_x = held.wind_x;
     f->wind_y = held.wind_y;
+    f->external_x = held.external_force_x * f->per_mass;
+    f->external_y = held.external_force_y * f->per_mass;
+    f->external_moment = held.external_moment * f->per_inertia;
 }
 
 static NEVER_INLINE void steer_now(struct load_function *f, double time)
@@ -245,7 +262,9 @@ static struct load_function load_function(const struct drive *drive, const struc
     f.x_d = drag_center(craft);
     f.drag_rate = drag_rate(craft);
     f.spin_rate = spin_rate(craft);
-    f.kind = f.k == 0.0 ? WITHOUT_DRAG : has_plain_drag(craft) && !is_windy(drive) ? PLAIN_DRAG : ANY_DRAG;
+    f.pushed = is_pushed(drive);
+    const bool plain = has_plain_drag(craft) && !is_windy(drive) && !f.pushed;
+    f.kind = f.k == 0.0 ? WITHOUT_DRAG : plain ? PLAIN_DRAG : ANY_DRAG;
     if (f.kind == ANY_DRAG) {
         f.ahead = drag_factor_ahead(craft);
         f.abeam = drag_factor_abeam(craft);
@@ -323,6 +342,11 @@ static ALWAYS_INLINE struct loads loads_as(struct load_function *f, enum drag_ki
         if (kind == ANY_DRAG)
             moment = moment - f->spin * yaw_rate * fabs(yaw_rate);
         loads = (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, moment, f->k * air.q};
+    }
+    if (kind != PLAIN_DRAG && f->pushed) {
+        loads.x = loads.x + f->external_x;
+        loads.y = loads.y + f->external_y;
+        loads.moment = loads.moment + f->external_moment;
     }
     if (slides) {
         const double turning = f->radius * yaw_rate;
@@ -514,14 +538,20 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
         }
         if (spins)
             damped = inertia + h * spin * fabs(z.yaw_rate);
+        double ahead = f->thrust, abeam = f->side, turn = f->turn;
+        if (f->pushed) {
+            ahead = ahead + (c * f->external_x + s * f->external_y);
+            abeam = abeam + (c * f->external_y - s * f->external_x);
+            turn = turn + f->external_moment;
+        }
         const double v = c * z.vy - s * z.vx;
-        const double b = inertia * z.yaw_rate + h * f->turn;
-        const double e = x_d * (mass * v + h * f->side) - b;
+        const double b = inertia * z.yaw_rate + h * turn;
+        const double e = x_d * (mass * v + h * abeam) - b;
         const double determinant = mass * damped + g * (damped + arm);
         const double kept = mass / (mass + g);
-        const double surge = h * f->thrust / (mass + g);
+        const double surge = h * ahead / (mass + g);
         const double sway =
-            ((damped + g * square) * (h * f->side) + g * x_d * (x_d * (g * kept) * v - b)) / determinant;
+            ((damped + g * square) * (h * abeam) + g * x_d * (x_d * (g * kept) * v - b)) / determinant;
         z.yaw_rate = (mass * b - g * e) / determinant;
         z.vx = kept * z.vx + (c * surge - s * sway);
         z.vy = kept * z.vy + (s * surge + c * sway);

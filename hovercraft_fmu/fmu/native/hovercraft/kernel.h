@@ -50,6 +50,8 @@ struct controls {
     double thrust;          /* N */
     double port, starboard; /* 1 */
     double wind_x, wind_y;  /* m/s: the velocity of the air */
+    double external_force_x, external_force_y; /* N */
+    double external_moment;                    /* N.m */
 };
 
 /* The controls over a communication step: `start + t*rate`, or what is answered when asked, then saturated. Else they

@@ -19,7 +19,7 @@ struct point {
     double u, v, w, q;              /* m/s: through the air, body frame; w and q at the centre of drag */
     double kq, kq_u, kq_w;          /* kg/s, kg/m: k*q, and its slopes over u and w */
     double drag_y;                  /* N: body frame */
-    double x, y;                    /* N: the force without friction, world frame */
+    double x, y;                    /* N: the force without friction and loads from outside, world frame */
     double thrust, port, starboard; /* 1: slopes of the saturation */
     struct friction_radius skirt;   /* m */
     double grip;                    /* kg/s: of friction */
@@ -109,9 +109,11 @@ static struct loads change(const struct point *p, const struct state *d, const s
     const double turning = p->skirt.radius * d->yaw_rate;
     const double along = p->slip_x * d->vx + p->slip_y * d->vy + p->slip_r * turning;
     return (struct loads){
-        .x = p->c * force_x - p->s * force_y - d->heading * p->y - p->grip * (d->vx - p->slip_x * along),
-        .y = p->s * force_x + p->c * force_y + d->heading * p->x - p->grip * (d->vy - p->slip_y * along),
-        .moment = x_d * drag_y + p->derived.thruster_moment * steering - spin * d->yaw_rate -
+        .x = p->c * force_x - p->s * force_y - d->heading * p->y + dc->external_force_x -
+             p->grip * (d->vx - p->slip_x * along),
+        .y = p->s * force_x + p->c * force_y + d->heading * p->x + dc->external_force_y -
+             p->grip * (d->vy - p->slip_y * along),
+        .moment = x_d * drag_y + p->derived.thruster_moment * steering + dc->external_moment - spin * d->yaw_rate -
                   p->grip * p->skirt.radius * (turning - p->slip_r * along),
     };
 }
