@@ -1,4 +1,4 @@
-"""python -m tests.screenshots [FOLDER]: the page to play in a browser at three sizes, light and dark, and what a frame takes.
+"""python -m tests.screenshots [FOLDER]: the page to play at three sizes, light and dark, and what a frame takes.
 
 Someone drives round the gates on every picture; the one of the README is among them, of few colours.
 """
@@ -28,7 +28,8 @@ AT_THE_HELM = """([seconds, frame]) => {
             const seen = page.flight.see().craft, gate = page.course.gates[page.course.next];
             const bearing = Math.atan2(gate.y - seen["pose.y"], gate.x - seen["pose.x"]);
             const course = seen.speed > 0.5 ? Math.atan2(seen["velocity.y"], seen["velocity.x"]) : bearing;
-            const off = turn(bearing + 1.5 * turn(bearing - course) - seen["pose.heading"] - 6 * seen["velocity.yaw_rate"]);
+            const ahead = seen["pose.heading"] + 6 * seen["velocity.yaw_rate"];
+            const off = turn(bearing + 1.5 * turn(bearing - course) - ahead);
             page.act("right", Number(off > 0.1));
             page.act("left", Number(off < -0.1));
             page.act("up", Number(seen.speed < 3.5));
@@ -38,7 +39,7 @@ AT_THE_HELM = """([seconds, frame]) => {
     }
     return [page.course.next, page.course.clock(page.flight.time), page.frames];
 }"""
-"""Frames as fast as they can be made, at ten times real time, by a clock of their own, which is ahead: then all stands."""
+"""Frames as fast as they can be made, at ten times real time, by a clock that is ahead: then all stands."""
 
 
 def opened(browser: Browser, file: Path, size: tuple[int, int], scheme: str, fragment: str = "") -> Page:
@@ -76,9 +77,7 @@ def main(folder: Path) -> None:
                 gates, _, frames = made.evaluate(AT_THE_HELM, [16.0, FRAME])
                 path = folder / f"{name}_{scheme}.png"
                 made.screenshot(path=path, full_page=size[0] < 1000)
-                print(
-                    f"{path}: {gates} gates; scripts of a frame: {median(frames):.2f} ms in the median of {len(frames)}"
-                )
+                print(f"{path}: {gates} gates; scripts of a frame: {median(frames):.2f} ms, median of {len(frames)}")
                 made.close()
         made = opened(browser, file, README_SIZE, "dark", "step_size=1&terms=rotational")
         made.evaluate(AT_THE_HELM, [11.0, FRAME])

@@ -55,29 +55,39 @@ def browser() -> Iterator[Browser]:
         pytest.skip(str(error))
 
 
-@pytest.fixture
-def opened(browser: Browser, file: Path) -> Iterator[Opened]:
-    """Opens the page, with a fragment; whatever is written to the console fails the test."""
-    contexts, written = [], []
+@pytest.fixture(scope="module")
+def window(browser: Browser) -> Iterator[tuple[Page, list[str]]]:
+    """A window for all tests, with keys and a finger; and what is written to its console."""
+    written: list[str] = []
 
     def heard(message: ConsoleMessage | Error) -> None:
         written.append(str(message) if isinstance(message, Error) else message.text)
 
-    def open_page(fragment: str = "", **options: Any) -> Page:
-        context = browser.new_context(**{"viewport": {"width": 800, "height": 600}, **options})
-        contexts.append(context)
+    with browser.new_context(has_touch=True) as context:
         made = context.new_page()
         made.set_default_timeout(30_000)
         made.on("console", heard)
         made.on("pageerror", heard)
-        made.goto(f"{file.as_uri()}#{fragment}")
+        yield made, written
+
+
+@pytest.fixture
+def opened(window: tuple[Page, list[str]], file: Path) -> Iterator[Opened]:
+    """Opens a page, with a fragment; whatever is written to the console fails the test."""
+    made, written = window
+
+    def open_page(fragment: str = "", size: tuple[int, int] = (480, 360), path: Path = file, **media: Any) -> Page:
+        made.goto("about:blank")
+        made.set_viewport_size({"width": size[0], "height": size[1]})
+        made.emulate_media(**{"color_scheme": "light", "reduced_motion": "no-preference", **media})
+        made.goto(f"{path.as_uri()}#{fragment}")
         expect(made.locator("#sorry")).to_be_hidden()
         return made
 
     yield open_page
-    for context in contexts:
-        context.close()
+    made.goto("about:blank")
     assert written == []
+    written.clear()
 
 
 RUN = """([name, method, size, step, duration, read]) => {
@@ -126,6 +136,7 @@ def native_run(native: Fmu, name: str, method: str, size: float) -> list[float]:
 def test_every_scene_and_method_has_the_bits_of_the_native_library(opened: Opened, native3_fmu: Path) -> None:
     """60 s of FMI calls in the page, and on the machine."""
     made = opened()
+    made.keyboard.press(" ")
     with Fmu(native3_fmu) as native:
         for name in SCENES:
             for method in (each.name for each in INTEGRATORS):
@@ -232,6 +243,7 @@ def test_half_an_hour_of_driving_does_not_grow(opened: Opened) -> None:
 
 def test_settings_are_made_again_and_again_in_the_same_memory(opened: Opened) -> None:
     made = opened()
+    made.keyboard.press(" ")
     again = "for (let i = 0; i < 50; i++) hovercraft.page.change({ step_size: [0.001, 0.01][i % 2] })"
     made.evaluate(again)
     size = made.evaluate("hovercraft.library.memory.buffer.byteLength")
@@ -304,7 +316,7 @@ def test_gates_are_passed_in_their_order(opened: Opened) -> None:
 
 
 def test_a_finger_holds_what_a_key_does(opened: Opened) -> None:
-    made = opened("scale=50", has_touch=True, viewport={"width": 360, "height": 740})
+    made = opened("scale=50", (360, 740))
     for name in ("Turn to port", "Turn to starboard", "More thrust"):
         made.get_by_label(name).dispatch_event("pointerdown", {"pointerId": 1})
     made.wait_for_function("hovercraft.page.flight.inputs.thrust > 1")
@@ -339,8 +351,9 @@ FIELDS = """[...document.querySelectorAll("#panel :is(input, select, button, tex
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_is_legible(opened: Opened, width: int, height: int, scheme: str) -> None:
     """Nothing is wider than the screen or than its own place; contrast is as WCAG 2 wants it (4.5); all has a name."""
-    made = opened(viewport={"width": width, "height": height}, color_scheme=scheme)
+    made = opened("", (width, height), color_scheme=scheme)
     made.keyboard.press("g")
+    made.keyboard.press(" ")
     assert made.evaluate("document.documentElement.scrollWidth") <= width
     assert made.evaluate(CUT) == []
     for name in ("--ink", "--quiet", "--accent", "--bad"):
@@ -365,19 +378,15 @@ def test_the_keyboard_reaches_everything(opened: Opened) -> None:
     assert made.evaluate("hovercraft.page.settings.step_size") == 0.002
 
 
-def test_an_fmu_with_start_values_of_its_own_has_them_on_its_page(
-    opened: Opened, browser: Browser, file: Path, tmp_path: Path
-) -> None:
+def test_an_fmu_with_start_values_of_its_own_has_them_on_its_page(opened: Opened, file: Path, tmp_path: Path) -> None:
     """The module and its description say the same, and the command names the file."""
     own = tmp_path / FILE
     own.write_bytes(page(variant(NATIVE, "Heavy", {"mass": 200.0, "integrator": "rk4"})))
-    with browser.new_context() as context:
-        made = context.new_page()
-        made.goto(own.as_uri())
-        expect(made.locator("#about")).to_contain_text("Heavy")
-        assert made.evaluate("hovercraft.page.flight.craft.get('mass').mass") == 200.0
-        assert made.evaluate("hovercraft.page.flight.values") == {"error_estimate": 2, "integrator": 1}
-        assert made.locator("#command").input_value().startswith("hovercraft-fmu simulate Heavy.fmu --input")
+    made = opened("", path=own)
+    expect(made.locator("#about")).to_contain_text("Heavy")
+    assert made.evaluate("hovercraft.page.flight.craft.get('mass').mass") == 200.0
+    assert made.evaluate("hovercraft.page.flight.values") == {"error_estimate": 2, "integrator": 1}
+    assert made.locator("#command").input_value().startswith("hovercraft-fmu simulate Heavy.fmu --input")
     assert page() == file.read_bytes()  # and the ordinary one is the same when it is made again
 
 

@@ -29,6 +29,7 @@ class Page {
     this.settings = parsed(location.hash.slice(1), data, description, (text) => this.say("Error", text));
     this.paused = false;
     this.late = false;
+    this.stale = true; // whether there is something new to be seen
     this.failed = "";
     this.course = /** @type {Course | null} */ (null);
     this.pace = new Pace();
@@ -49,7 +50,10 @@ class Page {
     const touch = matchMedia("(any-pointer: coarse)").matches || navigator.maxTouchPoints > 0;
     element("pads").hidden = !touch;
     element("sea").classList.toggle("touch", touch);
-    const measure = () => this.picture.measure();
+    const measure = () => {
+      this.picture.measure();
+      this.stale = true;
+    };
     new ResizeObserver(measure).observe(element("view"));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", measure);
     this.controls.show();
@@ -95,6 +99,7 @@ class Page {
       const next = this.begun(state, thrust);
       flight.free();
       this.flight = next;
+      this.stale = true;
       this.failed = "";
     } catch (error) {
       this.fail(error);
@@ -125,6 +130,7 @@ class Page {
   pause() {
     this.paused = !this.paused;
     this.pace.restart(performance.now() / 1000);
+    this.stale = true;
     write("pause", this.paused ? "Go on" : "Pause");
     element("paused").hidden = !this.paused;
   }
@@ -143,6 +149,7 @@ class Page {
     flight.reset(this.newSource(flight.values));
     held.forEach((what) => this.act(what, 1));
     this.clearNotices();
+    this.stale = true;
     this.picture.clear();
     this.chart.clear();
     if (this.course)
@@ -155,6 +162,7 @@ class Page {
     this.course = this.course ? null : new Course(pose(this.flight.see().craft));
     if (this.course && this.settings.view === "wrap")
       this.change({ view: "open" });
+    this.stale = true;
     write("gates", this.course ? "No gates" : "Course of gates");
   }
 
@@ -170,6 +178,7 @@ class Page {
   }
 
   settled() {
+    this.stale = true;
     this.controls.show();
     history.replaceState(null, "", `#${fragment(this.settings, this.data)}`);
   }
@@ -233,7 +242,9 @@ class Page {
     }
     if (this.late)
       pace.restart(now);
-    this.draw(now);
+    if (this.stale)
+      this.draw(now);
+    this.stale = !this.paused && !this.failed;
     this.frames.push(performance.now() - began);
     if (this.frames.length > 300)
       this.frames.shift();
@@ -241,6 +252,7 @@ class Page {
 
   /** @param {number} n communication steps */
   advance(n) {
+    this.stale = true;
     try {
       this.flight.advance(n);
     } catch (error) {
