@@ -41,10 +41,10 @@ class Shell:
         assert (done.status, done.err) == (0, "")
         return done.out
 
-    def refused(self, *arguments: str) -> str:
-        """The one line that says why."""
+    def refused(self, *arguments: str, status: int = 1) -> str:
+        """The one line that says why; status 2 where it is in how the command was used."""
         done = self.run(*arguments)
-        assert done.status == 1
+        assert done.status == status
         assert len(done.err.splitlines()) == 1
         assert done.err.startswith("hovercraft-fmu: ")
         return done.err

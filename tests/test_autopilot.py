@@ -30,7 +30,7 @@ from hovercraft_fmu.fmu.interface import BY_NAME, INPUTS, STATES
 from hovercraft_fmu.host import read_description
 from hovercraft_fmu.model.dynamics import State
 from hovercraft_fmu.simulation import plan, run_fmu
-from hovercraft_fmu.validation import SCHEMAS, validate, validate_elsewhere
+from hovercraft_fmu.validation import FMPY, validate, validate_elsewhere
 from tests.blobs import with_build
 from tests.conftest import Fresh
 from tests.lowlevel import one
@@ -119,7 +119,7 @@ def test_names_units_and_structure(autopilot: Path) -> None:
     with zipfile.ZipFile(autopilot) as archive:
         xml = etree.fromstring(archive.read("modelDescription.xml"))
         page = archive.read("documentation/index.html").decode()
-    etree.XMLSchema(file=str(SCHEMAS / "fmi2" / "fmi2ModelDescription.xsd")).assertValid(xml)
+    etree.XMLSchema(file=str(FMPY / "schema" / "fmi2" / "fmi2ModelDescription.xsd")).assertValid(xml)
     assert xml.get("variableNamingConvention") == "structured"
     assert all(f"<code>{variable.name}</code>" in page for variable in VARIABLES)
     assert "h*M*Q/I" in page

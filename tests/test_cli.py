@@ -1,5 +1,7 @@
 """The command as its user meets it, in an empty folder; as a program of its own it is in test_readme.py."""
 
+import csv
+import json
 import os
 import re
 import subprocess
@@ -7,13 +9,15 @@ import sys
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
+from click.shell_completion import ShellComplete
 from PIL import Image
 from rich.console import Group
 from rich.table import Table
 
-from hovercraft_fmu.cli import OUTPUT
+from hovercraft_fmu.cli import OUTPUT, commands
 from hovercraft_fmu.fmu.archive import zipped
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.studies import MEASUREMENTS
@@ -77,28 +81,69 @@ def test_build_and_validate(shell: Shell) -> None:
     assert shell.ok("validate").startswith("checking build/HovercraftNative.fmu")
     printed, built = shell.ok("build", "python"), shell.folder / "build" / "Hovercraft.fmu"
     assert printed.startswith(f"build/Hovercraft.fmu: {built.stat().st_size / 1000:.0f} kB, ")
-    assert shell.ok("validate", "build/Hovercraft.fmu", "build/Hovercraft.fmu").count("checking") == 2
+    assert shell.ok("validate", "build/Hovercraft.fmu", "build/HovercraftNative.fmu").count("checking") == 2
     checked = [line for line in shell.ok("validate").splitlines() if line.startswith("checking")]
     assert checked == ["checking build/HovercraftNative.fmu", "checking build/Hovercraft.fmu"]
 
 
-def test_an_ssp_file_is_named_as_such(shell: Shell) -> None:
+def test_an_ssp_file_is_named_as_such_and_checked(shell: Shell) -> None:
     shell.ok("build", "python_loop")
-    for command in ("simulate", "validate"):
-        done = shell.run(command, "build/HovercraftLoop.ssp")
-        assert (done.status, done.out) == (1, "")
-        assert done.err.startswith("hovercraft-fmu: build/HovercraftLoop.ssp: is an SSP file, a loop of FMUs: must be")
-        assert "'hovercraft-fmu demo --loop'" in done.err
+    done = shell.run("simulate", "build/HovercraftLoop.ssp")
+    assert (done.status, done.out) == (1, "")
+    assert done.err.startswith("hovercraft-fmu: build/HovercraftLoop.ssp: is an SSP file, a loop of FMUs: must be")
+    assert "'hovercraft-fmu demo --loop'" in done.err
+    printed = shell.ok("validate", "build/HovercraftLoop.ssp")
+    assert printed.count("  ok    ") == 2 + 2 * 3
+    assert "resources/Autopilot.fmu: load, initialize, 5 steps" in printed
+    assert printed.endswith("valid: 1 file, every check passed\n")
+
+
+def test_what_an_ssp_file_lacks_is_found(shell: Shell) -> None:
+    """A schema, a member, a connector, the end of a connection."""
+    shell.ok("build", "python_loop")
+    path = shell.folder / "build" / "HovercraftLoop.ssp"
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    structure = files["SystemStructure.ssd"].replace(b'name="pose.x"', b'name="pose.z"', 1)
+    files["SystemStructure.ssd"] = structure.replace(b"Autopilot.fmu", b"Pilot.fmu").replace(b'version="1.0"', b"")
+    del files["resources/Hovercraft.fmu"]
+    path.write_bytes(zipped(files))
+    done = shell.run("validate", str(path), "--json")
+    assert done.status == 1
+    checks = json.loads(done.out)["files"][0]["checks"]
+    assert [check["result"] for check in checks[:2]] == ["FAILED", "FAILED"]
+    assert "attribute 'version' is required" in checks[0]["problems"][0]
+    problems = "\n".join(checks[1]["problems"])
+    assert "source = 'resources/Pilot.fmu': must be in the archive" in problems
+    assert "source = 'resources/Hovercraft.fmu': must be in the archive" in problems
+    assert re.search(r"connection (start|end) = '\w+\.pose\.x': must be a connector", problems)
 
 
 @pytest.mark.usefixtures("native_at_hand")
-@pytest.mark.parametrize("option", ["--output=file/a.csv", "--plot=file/b/a.png", "--animate=file/a.gif", "--output=."])
+def test_validate_goes_on_and_ends_with_one_verdict(shell: Shell) -> None:
+    (shell.folder / "bad.ssp").write_bytes(zipped({"SystemStructure.ssd": b"no XML"}))
+    names = ("nix.fmu", "bad.ssp", "build/HovercraftNative.fmu")
+    done = shell.run("validate", *names, "--junit", "a/report.xml")
+    assert done.status == 1
+    assert [line for line in done.out.splitlines() if line.startswith("checking")] == [f"checking {n}" for n in names]
+    assert done.err == "hovercraft-fmu: not valid: 2 of 3 files, 2 problems found\n"
+    suites = ET.parse(shell.folder / "a" / "report.xml").getroot()
+    assert [(each.get("name"), each.get("failures")) for each in suites] == list(zip(names, "110", strict=True))
+    assert int(suites[2].get("tests", "")) == len(suites[2].findall("testcase")) == 4
+    assert "nix.fmu: no such FMU" in suites[0][0][0].get("message", "")
+
+
+@pytest.mark.usefixtures("native_at_hand")
+@pytest.mark.parametrize(
+    "option", ["--output=file/a.csv", "--plot=file/b/a.png", "--animate=file/a.gif", "--output=d.csv"]
+)
 def test_what_cannot_be_written_is_said_before_the_run(option: str, shell: Shell) -> None:
     (shell.folder / "file").touch()
+    (shell.folder / "d.csv").mkdir()
     done = shell.run("simulate", option)
     assert (done.status, done.out) == (1, "")
     assert re.fullmatch(
-        r"hovercraft-fmu: (file/.*: must be in a folder, and file is a file|\.: must be a file, and is a folder)\n",
+        r"hovercraft-fmu: (file/.*: must be in a folder, and file is a file|d\.csv: must be a file, and is a folder)\n",
         done.err,
     )
 
@@ -106,8 +151,7 @@ def test_what_cannot_be_written_is_said_before_the_run(option: str, shell: Shell
 def test_no_fmu_is_refused_before_it_is_said_to_run(shell: Shell) -> None:
     (shell.folder / "a.fmu").write_bytes(b"no archive")
     for name in ("a.fmu", "nix.fmu"):
-        for command in ("simulate", "validate"):
-            assert shell.run(command, name).out == ""
+        assert shell.run("simulate", name).out == ""
 
 
 def test_validate_fails_loudly(fmu: Path, shell: Shell) -> None:
@@ -136,7 +180,7 @@ def test_the_native_fmu_is_run_where_none_is_named(shell: Shell, fmu: Path) -> N
     assert other.startswith("running build/Hovercraft.fmu\n")
     assert other.splitlines()[1:] == printed.splitlines()[1:]
     assert python.read_bytes() == fmu.read_bytes()
-    assert "must not be given together" in shell.refused(*short, "--fmu", "python", "build/Hovercraft.fmu")
+    assert "must not be given together" in shell.refused(*short, "--fmu", "python", "build/Hovercraft.fmu", status=2)
     _edit(native, b' version="', b' version="0.0.')
     assert "is of version 0.0.0.1.0 of hovercraft-fmu, which is 0.1.0 now; 'hovercraft-fmu build native' writes" in (
         shell.refused(*short)
@@ -201,30 +245,115 @@ def test_list_scenes(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("simulate", "--scene", "nix"), "scene = 'nix': must be one of launch"),
-        (("simulate", "--set", "mass"), "--set mass: must be NAME=VALUE"),
-        (("simulate", "--set", "mass=1", "--set", "mass=2"), "--set mass=2: must be given once, and is mass=1 already"),
-        (("drive", "--integrator", "rk4", "--set", "integrator=heun"), "--set integrator=rk4: must be given once"),
-        (("simulate", "--output", ""), "'': must be a path"),
+        (("simulate", "--scene", "trun"), "scene = 'trun': must be one of launch, .*; did you mean 'turn'?"),
+        (("simulate", "--output", "a.txt"), "output = 'a.txt': must end in .csv or .parquet"),
+        (("simulate", "--reference", "nix.csv"), "nix.csv: No such file or directory"),
         (("simulate", "--set", "mass=1e400"), "mass = 1e400: must be a finite number"),
         (("simulate", "--set", "mass=-4"), "mass = -4.0: must be greater than 0"),
-        (("simulate", "--set", "nix=4"), "nix = 4: must be a variable that can be set"),
+        (("simulate", "--set", "mas=4"), "mas = 4: must be a variable that can be set.*; did you mean 'mass'?"),
         (("simulate", "--input", "nix.csv"), "nix.csv: No such file or directory"),
-        (("simulate", "--input", "nix.csv", "--scene", "turn"), "must not be given together"),
         (("simulate", "nix.fmu"), "nix.fmu: no such FMU"),
-        (("simulate", "--plot", "a.txt"), "plot = 'a.txt': must end in .png"),
+        (("simulate", "--plot", "a.txt"), "plot = 'a.txt': must end in .png, .svg or .pdf"),
         (("sweep", "turning_circle", "--plot", "a.txt"), "plot = 'a.txt': must end in .png"),
+        (("sweep", "turning_circl"), "did you mean 'turning_circle'?"),
         (("simulate", "--preset", "moon"), "preset = 'moon': must be one of textbook, ice"),
-        (("simulate", "--stop-time", "soon"), "'soon' is not a valid float"),
-        (("simulate", "--frob",), "No such option"),
-        (("frob",), "No such command 'frob'"),
-        (("validate", "nix.fmu"), "nix.fmu: no such FMU"),
-        (("validate", "--table", "nix.fmu"), "nix.fmu: no such FMU"),
+        (("validate", "nix.fmu", "--quiet"), "not valid: 1 of 1 file, 1 problem found"),
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("native_at_hand")
 def test_what_is_wrong_is_one_clear_line(shell: Shell, arguments: tuple[str, ...], message: str) -> None:
-    assert message in shell.refused(*arguments)
+    assert re.search(re.escape(message).replace(r"\.\*", ".*"), shell.refused(*arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("simulate", "--set", "mass"), "--set mass: must be NAME=VALUE"),
+        (("simulate", "--set", "mass=1", "--set", "mass=2"), "--set mass=2: must be given once, and is mass=1 already"),
+        (("drive", "--integrator", "rk4", "--set", "integrator=heun"), "--set integrator=rk4: must be given once"),
+        (("simulate", "--output", ""), "'': must be a path"),
+        (("simulate", "--input", "nix.csv", "--scene", "turn"), "must not be given together"),
+        (("simulate", "--stop-time", "soon"), "'soon' is not a valid float"),
+        (("simulate", "--frob",), "No such option"),
+        (("frob",), "No such command 'frob'"),
+    ],
+)  # fmt: skip
+def test_a_wrong_use_ends_with_2(shell: Shell, arguments: tuple[str, ...], message: str) -> None:
+    assert message in shell.refused(*arguments, status=2)
+
+
+@pytest.mark.usefixtures("native_at_hand")
+def test_how_much_is_said(shell: Shell) -> None:
+    short = ("simulate", "--scene", "turn", "--stop-time", "1", "--set", "step_size=0.1")
+    assert shell.ok(*short, "-q") == ""
+    assert re.search(r"took \d+\.\d s\n", shell.run(*short, "-v").err)
+    assert "Traceback" in shell.run("simulate", "--scene", "nix", "-v").err
+    assert shell.ok(*short).startswith("running ")  # it is not kept
+
+
+@pytest.mark.usefixtures("native_at_hand")
+def test_results_as_json(shell: Shell) -> None:
+    result = json.loads(shell.ok("simulate", "--scene", "turn", "--stop-time", "1", "--output", "a.csv", "--json"))
+    with (shell.folder / "a.csv").open() as file:
+        *_, last = csv.DictReader(file)
+    assert result["end"]["pose.x"] == float(last["pose.x"])
+    assert (result["scene"], result["communication_steps"], result["warnings"]) == ("turn", 10, [])
+    built = json.loads(shell.ok("build", "python", "--json"))
+    assert built[0]["bytes"] == (shell.folder / built[0]["file"]).stat().st_size
+    advice = json.loads(shell.ok("advise", "--scene", "launch", "--within", "0.1", "--json"))
+    assert advice["is_met"]
+    assert advice["best"]["true"] <= 0.1
+    assert advice["command"].startswith("hovercraft-fmu simulate --scene launch")
+
+
+@pytest.mark.usefixtures("native_at_hand")
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_a_run_is_compared_with_a_stored_one(shell: Shell, ending: str) -> None:
+    short = ("simulate", "--scene", "turn", "--stop-time", "8", "--set", "step_size=0.1")
+    shell.ok(*short, "--output", f"a/stored.{ending}")
+    same = ("--reference", f"a/stored.{ending}")
+    assert "28 columns are those of" in shell.ok(*short, *same, "--within", "0")
+    other = shell.run(*short, *same, "--set", "mass=100.001")
+    assert other.status == 1
+    assert re.search(r"^pose.x +\d\S+ +[\d.]+ s +FAILED$", other.out, re.MULTILINE)
+    assert re.search(r"columns differ from a/stored\.\w+, most \S+ by \S+ at [\d.]+ s", other.err)
+    shell.ok(*short, *same, "--set", "mass=100.001", "--within", "0.01")
+    assert "must be a communication point" in shell.refused(*short, *same, "--stop-time", "4")
+
+
+@pytest.mark.usefixtures("native_at_hand")
+def test_a_stored_result_of_another_host(shell: Shell) -> None:
+    """With fewer columns and rows; a value that is no number is off."""
+    short = ("simulate", "--scene", "launch", "--stop-time", "1", "--set", "step_size=0.1", "--output", "a.csv")
+    shell.ok(*short)
+    with (shell.folder / "a.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for name, value in (("good", rows[5]["pose.x"]), ("bad", "nan")):
+        (shell.folder / f"{name}.csv").write_text(f"time,pose.x\n0,0\n{rows[5]['time']},{value}\n")
+    assert "1 columns are those of good.csv" in shell.ok(*short, "--reference", "good.csv", "--within", "0")
+    assert "pose.x by inf at" in shell.run(*short, "--reference", "bad.csv").err
+
+
+@pytest.mark.parametrize("width", [40, 80, 160])
+def test_nothing_is_cut(width: int, shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(OUTPUT, "width", width)
+    printed = shell.ok("simulate", "--list-scenes")
+    assert max(map(len, printed.splitlines())) <= width
+    for scene in SCENES.values():
+        assert set(scene.description.split()) <= set(printed.split())
+
+
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [("simulate --scene tu", "turn"), ("simulate --set mas", "mass="), ("sweep tu", "turning_circle"),
+     ("simulate --preset i", "ice"), ("sim", "simulate")],
+)  # fmt: skip
+def test_a_shell_completes(typed: str, expected: str) -> None:
+    words = ["hovercraft-fmu", *typed.split()]
+    done = ShellComplete(commands, {}, "hovercraft-fmu", "_HOVERCRAFT_FMU_COMPLETE").get_completions(
+        words[1:-1], words[-1]
+    )
+    assert expected in [each.value for each in done]
 
 
 HIDDEN = {

@@ -897,11 +897,11 @@ def test_what_is_wrong_is_one_clear_line(tmp_path: Path, shell: Shell) -> None:
         (("nix.toml",), "study = 'nix.toml': must be a TOML file, or one of turning_circle"),
         (("NOSUCH",), "study = 'NOSUCH': must be a TOML file, or one of turning_circle"),
         (("bad.toml",), "bad.toml: frob = 3: the key must be one of scene"),
-        ((), "Missing argument 'STUDY'"),
         (("turning_circle", "nix.fmu"), "nix.fmu: no such FMU"),
         (("turning_circle", "--engine", "steam"), "engine = 'steam': must be one of fmu, batch"),
     ):
         assert message in shell.refused("sweep", *arguments)
+    assert "Missing argument 'STUDY'" in shell.refused("sweep", status=2)
 
 
 @pytest.mark.once
@@ -919,6 +919,32 @@ def test_the_quick_costs_of_a_run(tmp_path: Path, complete_native_fmu: Path, mon
         assert seconds == pytest.approx(float(row["seconds"]))
         assert float(row["peak_memory"]) > 10.0 or not Path("/proc/self/status").exists()
     assert (tmp_path / "sweep.md").read_text(encoding="utf-8").strip() in report
+
+
+@pytest.mark.usefixtures("native_at_hand")
+def test_what_a_person_is_told(shell: Shell) -> None:
+    """Runs that never reached an event; degrees; a sweep that takes the place of another one."""
+    (shell.folder / "many.toml").write_text(
+        """scene = "turn"
+set.integrator = "rk4"
+set.step_size = 0.1
+keep.end = ["pose.heading"]
+keep.events.far = { of = "pose.x", above = 18.0, values = ["speed"] }
+sweep.mass = [50.0, 100.0, 400.0]
+sweep.pose.heading = [0.0, 3.141592653589793]
+"""
+    )
+    command = ("sweep", "many.toml", "--engine", "batch", "--workers", "1")
+    printed = shell.ok(*command)
+    runs = load(shell.folder / "build" / "sweep" / "many")
+    never = [number for number, x in enumerate(runs["far.time"].to_pylist()) if x is None]
+    assert 0 < len(never) < 6
+    assert f"far: {len(never)} of 6 runs never reached it: run {', '.join(map(str, never))}" in printed
+    assert "pose.heading [deg] = 180" in printed
+    assert "another sweep" in shell.refused(*command[:2], "--fmu", "native")
+    told = json.loads(shell.ok(*command, "--overwrite", "--json"))
+    assert (told["runs"], told["new"], told["never_reached"]) == (6, 6, {"far": never})
+    assert [each["unit"] for each in told["extremes"] if each["column"] == "end.pose.heading"] == ["deg"]
 
 
 def test_every_scene_can_be_swept() -> None:

@@ -4,13 +4,16 @@ A command loads what it needs when it runs: `--help` is there at once.
 """
 
 import sys
+import traceback
+from time import perf_counter
+from typing import NoReturn
 
 import click
 
 from .. import stopping
 from .._version import __version__
 from . import demos, files, many, running
-from .output import OUTPUT, one_line
+from .output import OUTPUT, QUIET_OPTION, VERBOSE_OPTION, VOICE, one_line
 
 __all__ = ["OUTPUT", "commands", "main"]
 
@@ -19,23 +22,40 @@ EXPECTED = (ValueError, OSError, ArithmeticError, ModuleNotFoundError)
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command and leave the process: status 0, or 1 after a line for each thing that is wrong; 130 where
-    it was stopped."""
+    """Run the command and leave the process: status 0; 1 after a line for each thing that is wrong, 2 where it is in
+    how the command was used; 130 where it was stopped."""
+    OUTPUT.quiet = VOICE.is_verbose = False
+    begun = perf_counter()
     try:
         status = commands.main(arguments, prog_name="hovercraft-fmu", standalone_mode=False)
     except click.exceptions.Abort:
         stopping.end()
     except click.ClickException as error:
-        sys.exit(f"hovercraft-fmu: {error.format_message()}")
+        _say(error.format_message())
+        sys.exit(error.exit_code)
     except EXPECTED as error:
-        sys.exit("\n".join(f"hovercraft-fmu: {line}" for line in getattr(error, "mistakes", (one_line(error),))))
+        _fail(error)
     except RuntimeError as error:
         from ..host import SimulationError
 
         if not isinstance(error, SimulationError):
             raise
-        sys.exit("hovercraft-fmu: " + one_line(error))
+        _fail(error)
+    if VOICE.is_verbose:
+        click.echo(f"took {perf_counter() - begun:.1f} s", err=True)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(error: Exception) -> NoReturn:
+    if VOICE.is_verbose:
+        traceback.print_exception(error)
+    for line in getattr(error, "mistakes", (one_line(error),)):
+        _say(line)
+    sys.exit(1)
+
+
+def _say(what: str) -> None:
+    click.echo(f"hovercraft-fmu: {what}", err=True)
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -70,4 +90,5 @@ for each in (
     many.sweep,
     files.cross_check,
 ):
+    each.params += [QUIET_OPTION, VERBOSE_OPTION]
     commands.add_command(each)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .files import validated
+from .files import checked
 from .options import FOLDER, make_room
 from .output import OUTPUT, print_rows, progress_of
 from .running import print_result, simulated, write
@@ -55,7 +55,7 @@ def _built_and_valid(kind: "Kind") -> Path:
 
     fmu = build(kind)
     OUTPUT.print(f"built {fmu}")
-    if validated(fmu):
+    if any(check.problems for check in checked(fmu)):
         raise click.ClickException("the FMU is not valid")
     return fmu
 

@@ -1,14 +1,14 @@
 """The commands that write and check files: build, play, validate, cross-check."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..model.craft import PRESETS
 from ..view.tables import markdown
 from .options import FOLDER, PathOf, settings_of
-from .output import OUTPUT
+from .output import OUTPUT, json_option, print_json, progress_of
 
 if TYPE_CHECKING:
     from ..building import Product
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 @click.option("--name", metavar="NAME", help="Write one FMU under this name, with start values of its own.")
 @click.option("--preset", metavar="NAME", help=f"With --name: those of a craft: {', '.join(PRESETS)}.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="With --name: a start value; repeatable.")
+@json_option
 def build(
-    kinds: tuple[str, ...], output: Path, name: str | None, preset: str | None, settings: tuple[str, ...]
+    kinds: tuple[str, ...], output: Path, name: str | None, preset: str | None, settings: tuple[str, ...], as_json: bool
 ) -> None:
     """Write the FMUs and the SSP files of the closed loop.
 
@@ -46,6 +47,9 @@ def build(
     for each in wanted:
         check_target(output / each.name, Path(each.name).suffix)
     reasons = {each.name: _written(each, output / each.name) for each in wanted}
+    if as_json:
+        made = [(output / each.name, each.purpose) for each in wanted if not reasons[each.name]]
+        print_json([{"file": file, "bytes": file.stat().st_size, "purpose": purpose} for file, purpose in made])
     if missing := [name for name, reason in reasons.items() if reason]:
         raise click.ClickException(f"not written: {', '.join(missing)}; {reasons[missing[0]]}")
 
@@ -84,48 +88,79 @@ def _written(chosen: "Product", path: Path) -> str:
 
 
 @click.command("validate")
-@click.argument("fmus", nargs=-1, metavar="[FMU ...]", type=PathOf(path_type=Path))
+@click.argument("files", nargs=-1, metavar="[FILE ...]", type=PathOf(path_type=Path))
 @click.option("--table", is_flag=True, help="Ask other checkers and hosts, too, and print a table (Markdown).")
-def validate(fmus: tuple[Path, ...], table: bool) -> int:
-    """Check FMUs: the schema, fmpy's validation, and a real run.
+@click.option("--junit", type=PathOf(path_type=Path, dir_okay=False), metavar="FILE.xml", help="Write a JUnit report.")
+@json_option
+def validate(files: tuple[Path, ...], table: bool, junit: Path | None, as_json: bool) -> None:
+    """Check FMUs and SSP files: the schema, fmpy's validation, and a real run; of an SSP what it names, and its FMUs.
 
-    Without FMU: those that 'hovercraft-fmu build' wrote into build/; where there is none, build/HovercraftNative.fmu,
-    which is built. (One with --name is named.) With --table hosts run FMUs of the hovercraft alone.
+    Without FILE: the FMUs that 'hovercraft-fmu build' wrote into build/; where there is none,
+    build/HovercraftNative.fmu, which is built. (One with --name is named.) With --table hosts run FMUs of
+    the hovercraft alone.
     """
     from ..building import built_fmus
+    from ..validation import junit_report
+    from ..whole import check_writable, write_whole
 
-    chosen = fmus or built_fmus()
-    if table:
-        problems = sum(_tabled(fmu, f"\n{fmu}:\n\n" if len(chosen) > 1 else "") for fmu in chosen)
-    else:
-        problems = sum(validated(fmu) for fmu in chosen)
-    if problems:
-        raise click.ClickException(f"{problems} problem{'s' if problems > 1 else ''} found")
-    return 0
+    if junit:
+        check_writable(junit)
+    chosen = files or built_fmus()
+    found = {
+        file: _tabled(file, f"\n{file}:\n\n" if len(chosen) > 1 else "") if table else checked(file)
+        for file in dict.fromkeys(chosen)
+    }
+    problems = {file: sum(len(check.problems) for check in checks) for file, checks in found.items()}
+    bad, many = sum(map(bool, problems.values())), sum(problems.values())
+    if junit:
+        write_whole(junit, junit_report(found))
+        OUTPUT.print(f"wrote {junit}")
+    if as_json:
+        print_json(
+            {
+                "valid": not bad,
+                "files": [
+                    {"file": file, "valid": not problems[file], "checks": [_as_json(each) for each in checks]}
+                    for file, checks in found.items()
+                ],
+            }
+        )
+    if bad:
+        kinds = f"{bad} of {len(found)} file{'s' if len(found) > 1 else ''}"
+        raise click.ClickException(f"not valid: {kinds}, {many} problem{'s' if many > 1 else ''} found")
+    if not table:
+        OUTPUT.print(f"valid: {len(found)} file{'s' if len(found) > 1 else ''}, every check passed")
 
 
-def validated(fmu: Path) -> int:
-    """Check one FMU, print what was checked, and return the number of problems."""
-    from ..validation import validate
+def _as_json(check: "Check") -> dict[str, Any]:
+    return {**check._asdict(), "result": check.result}
 
-    checks = validate(fmu)  # refuses what is no FMU
-    OUTPUT.print(f"checking {fmu}")
-    problems = 0
-    for check in checks:
+
+def checked(file: Path) -> "list[Check]":
+    """Check one file, print what was checked as it is done, and return it."""
+    from ..validation import check_file
+
+    OUTPUT.print(f"checking {file}")
+    checks = []
+    for check in check_file(file):
         OUTPUT.print(f"  {check.result:6} {check.what} ({check.checker} {check.version})")
         for problem in check.problems:
             OUTPUT.print(f"         {problem}")
-        problems += len(check.problems)
-    return problems
+        checks.append(check)
+    return checks
 
 
-def _tabled(fmu: Path, title: str) -> int:
+def _tabled(file: Path, title: str) -> "list[Check]":
     """The same in a table, with the checks of others."""
-    from ..validation import validate, validate_elsewhere
+    from ..validation import check_file, validate_elsewhere
 
-    checks = [*validate(fmu), *validate_elsewhere(fmu)]
-    click.echo(title + _checked_table(checks))
-    return sum(len(check.problems) for check in checks)
+    checks = []
+    with progress_of(1.0, f"checking {file}"):
+        checks = list(check_file(file))
+        if file.suffix == ".fmu" and checks[0].what != "read the file":
+            checks += validate_elsewhere(file)
+    OUTPUT.print(title + _checked_table(checks))
+    return checks
 
 
 def _checked_table(checks: "list[Check]") -> str:

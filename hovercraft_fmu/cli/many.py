@@ -1,21 +1,23 @@
 """The commands that make many runs: measure, sweep."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import click
 from rich.progress import MofNCompleteColumn, ProgressColumn, Task
-from rich.table import Table
 from rich.text import Text
 
-from ..studies import MEASUREMENTS, carry_out
-from .options import FOLDER, PathOf, make_room, named_fmu, of_an_fmu
-from .output import OUTPUT, progress_of
+from ..studies import MEASUREMENTS, carry_out, ready
+from .options import FOLDER, NameOf, PathOf, make_room, named_fmu, of_an_fmu
+from .output import OUTPUT, json_option, print_json, print_table, progress_of
 
 if TYPE_CHECKING:
     from ..building import Kind
 
+SHOWN_RUNS = 10
+"""Numbers of runs that are listed."""
 MEASURE = """Measure the product: what speed costs, what accuracy costs, where the methods break.
 
 NAME is one of these; what each takes is on a machine with nothing else to do:
@@ -33,13 +35,22 @@ MEASURE += "\n".join(f"  {name:12} {each.what} ({each.takes})" for name, each in
 )
 def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 - MEASURE
     folder = output or FOLDER / "measure" / name
+    ready(name)
+    takes = "less than half a minute" if quick else MEASUREMENTS[name].takes
+    click.echo(f"measuring {name} takes {takes} on a machine with nothing else to do", err=True)
     with progress_of(1.0, f"measuring {name}") as tell:
         report = carry_out(name, quick, folder, tell)
     OUTPUT.print(f"{report}\n\nwrote {folder}/")
 
 
+def _studies() -> Iterable[str]:
+    from ..sweeps import STUDIES
+
+    return STUDIES
+
+
 @click.command("sweep")
-@click.argument("study")
+@click.argument("study", type=NameOf(_studies))
 @of_an_fmu
 @click.option("--engine", metavar="NAME", default="fmu", show_default=True,
               help="fmu, or batch: the compiled kernel, all craft at once, with the native FMU's bits.")  # fmt: skip
@@ -54,7 +65,9 @@ def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 
     "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR",
     help="Default: build/sweep/ and the study.",
 )  # fmt: skip
-@click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png", help="Draw the results.")
+@click.option("--overwrite", is_flag=True, help="Delete the results that are there, of this or another sweep, before.")
+@click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png|.svg|.pdf", help="Draw the results.")
+@json_option
 def sweep(
     study: str,
     fmu: Path | None,
@@ -65,6 +78,7 @@ def sweep(
     tls_ca: Path | None,
     tls_cert: Path | None,
     tls_key: Path | None,
+    as_json: bool,
     **options: Any,
 ) -> None:
     """Make many runs of one FMU, in parallel, into Parquet files.
@@ -74,6 +88,7 @@ def sweep(
     same command.
     """
     from ..sweeps import read_study, sweep
+    from ..sweeps.store import extremes, unreached
 
     chosen = read_study(study)
     if plot:
@@ -95,6 +110,13 @@ def sweep(
     if outcome.warned:
         OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
     _print_extremes(outcome.folder)
+    missed = unreached(outcome.folder)
+    for name, runs in missed.items():
+        numbers = ", ".join(map(str, runs[:SHOWN_RUNS])) + (", ..." if len(runs) > SHOWN_RUNS else "")
+        OUTPUT.print(f"{name}: {len(runs)} of {outcome.runs} runs never reached it: run {numbers}")
+    if as_json:
+        found = [each._asdict() for each in extremes(outcome.folder)]
+        print_json({**outcome._asdict(), "seconds": seconds, "extremes": found, "never_reached": missed})
     if plot:
         from ..sweeps.charts import plot_sweep
 
@@ -112,13 +134,11 @@ class _Rate(ProgressColumn):
 def _print_extremes(folder: Path) -> None:
     from ..sweeps.store import extremes
 
-    table = Table(box=None, pad_edge=False)
-    for title in ("column", "least", "of the run with", "greatest", "of the run with"):
-        table.add_column(title)
+    rows = []
     for each in extremes(folder):
         cells = [each.column]
         for value, run in ((each.least, each.least_run), (each.greatest, each.greatest_run)):
             cells += [f"{value:.4g} {each.unit}", ", ".join(f"{name} = {part:.4g}" for name, part in run.items())]
-        table.add_row(*cells)
-    if table.row_count:
-        OUTPUT.print(table)
+        rows.append(cells)
+    if rows:
+        print_table(("column", "least", "of the run with", "greatest", "of the run with"), rows)

@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
+from ..model.craft import PRESETS
 from ..whole import check_writable
 from .output import OUTPUT
 
@@ -23,6 +25,35 @@ class PathOf(click.Path):
         if value == "":
             self.fail("'': must be a path", param, ctx)
         return super().convert(value, param, ctx)
+
+
+class NameOf(click.types.StringParamType):
+    """A name, which a shell completes; whether it is one is for the function to say that takes it."""
+
+    def __init__(self, names: Callable[[], Iterable[str]]) -> None:
+        self._names = names
+
+    def shell_complete(self, _context: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Those that begin so."""
+        return [CompletionItem(name) for name in self._names() if name.startswith(incomplete)]
+
+
+def _scenes() -> Iterable[str]:
+    from ..scenes import SCENES
+
+    return SCENES
+
+
+def _settable() -> Iterable[str]:
+    from ..fmu.interface import VARIABLES
+
+    return (f"{each.name}=" for each in VARIABLES if each.start is not None)
+
+
+scene_option = click.option("--scene", metavar="NAME", type=NameOf(_scenes), help="A named scene (default: launch).")
+set_option = click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", type=NameOf(_settable),
+                          help="Start value of a variable; repeatable.")  # fmt: skip
+PRESET_NAME = NameOf(lambda: PRESETS)
 
 
 def of_an_fmu(command: Callable[..., None]) -> Callable[..., None]:

@@ -3,41 +3,41 @@
 import math
 import shlex
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.table import Table
 
 from ..model.craft import PRESETS
 from ..view.operator import PRESET, TIME_SCALE
-from .options import PathOf, make_room, named_fmu, of_an_fmu, settings_of
-from .output import OUTPUT, print_rows, progress_of
+from .options import PRESET_NAME, PathOf, make_room, named_fmu, of_an_fmu, scene_option, set_option, settings_of
+from .output import OUTPUT, json_option, print_json, print_rows, print_table, progress_of
 
 if TYPE_CHECKING:
     from ..building import Kind
-    from ..simulation import Advice, Inputs, Result, Run
+    from ..simulation import Advice, Difference, Inputs, Result, Run
 
 
 @click.command("simulate")
 @of_an_fmu
-@click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
+@scene_option
 @click.option(
     "--input", "log", metavar="FILE.csv", type=PathOf(path_type=Path),
     help="A control log: columns time, thrust, port_thruster, starboard_thruster, wind.x, wind.y, external.force.x, "
     "external.force.y, external.moment (one left out holds its start value); linear between rows, two rows at one time "
     "are a jump.",
 )  # fmt: skip
-@click.option("--preset", metavar="NAME", help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--preset", metavar="NAME", type=PRESET_NAME, help=f"A craft: {', '.join(PRESETS)}.")
 @click.option("--start-time", type=float, metavar="S", help="Default: the first time of the inputs.")
 @click.option("--stop-time", type=float, metavar="S", help="Default: the last time of the inputs.")
 @click.option("--communication-step", type=float, metavar="S", help="Default: the scene's, or 0.01 s.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+@set_option
 @click.option(
-    "--output", type=PathOf(path_type=Path), metavar="FILE.csv",
-    help="Write all columns; as --input the file gives the same motion again.",
+    "--output", type=PathOf(path_type=Path), metavar="FILE.csv|FILE.parquet",
+    help="Write all columns; as --input a CSV file gives the same motion again.",
 )  # fmt: skip
-@click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png", help="Draw the run.")
+@click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png|.svg|.pdf", help="Draw the run.")
 @click.option(
     "--animate", "animation", type=PathOf(path_type=Path), metavar="FILE.gif|FILE.html",
     help="Draw the run as a moving picture, or as a page to play, zoom and point at.",
@@ -48,6 +48,11 @@ if TYPE_CHECKING:
     "are of the first.)",
 )  # fmt: skip
 @click.option("--error", is_flag=True, help="Have the FMU tell how far it is off; three times the cost.")
+@click.option("--reference", type=PathOf(path_type=Path), metavar="FILE.csv|.parquet",
+              help="Compare the run with a stored result, column by column; fails where one is off.")  # fmt: skip
+@click.option("--within", type=float, metavar="X", default=1e-9, show_default=True,
+              help="With --reference: how far off a value may be; relative where it is above 1.")  # fmt: skip
+@json_option
 @click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
 def simulate(
     fmu: Path | None,
@@ -60,6 +65,9 @@ def simulate(
     animation: Path | None,
     against: str | None,
     error: bool,
+    reference: Path | None,
+    within: float,
+    as_json: bool,
     list_scenes: bool,
     **options: Any,
 ) -> None:
@@ -67,7 +75,7 @@ def simulate(
 
     FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there.
     """
-    from ..simulation import plan
+    from ..simulation import differences, plan, read_columns
 
     if list_scenes:
         return _print_scenes()
@@ -78,15 +86,8 @@ def simulate(
     start_values = settings_of((*settings, "error_estimate=on") if error else settings)
     inputs: Inputs = log if log else scene or "launch"
     others = [{**start_values, **settings_of(against.split(","), "--against")}] if against is not None else []
-    if plot:
-        from ..drawing.figures import check_plot
-
-        check_plot(plot)
-    if animation:
-        from ..view.animation import check_animation
-
-        check_animation(animation)
-    make_room(output, plot, animation)
+    _check_files(output, plot, animation)
+    stored = read_columns(reference) if reference else None
     runs = [plan(inputs, start_values=each, **options) for each in (start_values, *others)]
     if len(runs[0].signals) == 1 and options["stop_time"] is None:
         duration = runs[0].stop_time - runs[0].start_time
@@ -100,24 +101,31 @@ def simulate(
     write(results[0], output, plot)
     if animation:
         _animate(results, animation)
+    off = [] if stored is None else differences(results[0], stored)
+    if as_json:
+        print_json({**results[0].summary, "fmu": path, "reference": [each._asdict() for each in off]})
+    if stored is not None:
+        _judge(off, str(reference), within)
     return None
 
 
 @click.command("advise")
 @of_an_fmu
-@click.option("--scene", metavar="NAME", help="A named scene (default: launch).")
+@scene_option
 @click.option("--input", "log", metavar="FILE.csv", type=PathOf(path_type=Path), help="A control log.")
 @click.option("--within", type=float, metavar="M", default=0.01, show_default=True,
               help="How far the position may be off, in metres, at every communication point.")  # fmt: skip
-@click.option("--preset", metavar="NAME", help=f"A craft: {', '.join(PRESETS)}.")
+@click.option("--preset", metavar="NAME", type=PRESET_NAME, help=f"A craft: {', '.join(PRESETS)}.")
 @click.option("--communication-step", type=float, metavar="S", help="Default: the scene's, or 0.01 s.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+@set_option
+@json_option
 def advise(
     fmu: Path | None,
     kind: "Kind | None",
     scene: str | None,
     log: Path | None,
     settings: tuple[str, ...],
+    as_json: bool,
     **options: Any,
 ) -> None:
     """Say which method and sub-step are the cheapest that keep a scene within a wanted error.
@@ -138,7 +146,12 @@ def advise(
     for name, value in options.items():
         words += [f"--{name.replace('_', '-')}", str(value)] if value is not None and name != "within" else []
     chosen = [*settings, *(f"{name}={value}" for name, value in advice.best.start_values.items())]
-    OUTPUT.print(f"to run it:\n  {shlex.join([*words, *(word for each in chosen for word in ('--set', each))])}")
+    command = shlex.join([*words, *(word for each in chosen for word in ("--set", each))])
+    OUTPUT.print(f"to run it:\n  {command}")
+    if as_json:
+        tried = {"best": advice.best, "runner_up": advice.runner_up}
+        found = {name: each and asdict(each) for name, each in tried.items()}
+        print_json({**found, "within": advice.within, "is_met": advice.is_met, "held": advice.held, "command": command})
     if not advice.is_met:
         raise click.ClickException(f"no setting stays within {advice.within:g} m; that is the best there is")
 
@@ -146,10 +159,17 @@ def advise(
 @click.command("drive")
 @of_an_fmu
 @click.option("--record", metavar="FILE.csv", type=PathOf(path_type=Path), help="Write what you do, to replay it.")
-@click.option("--preset", metavar="NAME", default=PRESET, show_default=True, help=f"A craft: {', '.join(PRESETS)}.")
+@click.option(
+    "--preset",
+    metavar="NAME",
+    type=PRESET_NAME,
+    default=PRESET,
+    show_default=True,
+    help=f"A craft: {', '.join(PRESETS)}.",
+)
 @click.option("--integrator", metavar="NAME", help="The method of a sub-step; as --set integrator=NAME.")
 @click.option("--step-size", metavar="S", help="The sub-step; as --set step_size=S.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Start value of a variable; repeatable.")
+@set_option
 @click.option("--communication-step", type=float, metavar="S", help="Default: 0.01 s.")
 @click.option(
     "--time-scale", type=float, default=TIME_SCALE, show_default=True, metavar="N", help="Simulated seconds a second."
@@ -203,13 +223,41 @@ def simulated(run: "Run", fmu: Path) -> "Result":
 def _print_scenes() -> None:
     from ..scenes import SCENES
 
-    table = Table(box=None, pad_edge=False)
-    for title in ("scene", "what happens", "craft", "duration", "exact solution"):
-        table.add_column(title)
-    for scene in SCENES.values():
-        exact = "yes" if scene.exact else ""
-        table.add_row(scene.name, scene.description, scene.preset, f"{scene.stop_time:g} s", exact)
-    OUTPUT.print(table)
+    rows = [
+        (scene.name, scene.description, scene.preset, f"{scene.stop_time:g} s", "yes" if scene.exact else "")
+        for scene in SCENES.values()
+    ]
+    print_table(("scene", "what happens", "craft", "duration", "exact solution"), rows)
+
+
+def _check_files(output: Path | None, plot: Path | None, animation: Path | None) -> None:
+    """What cannot be written is said before the run."""
+    if output:
+        from ..simulation import check_output
+
+        check_output(output)
+    if plot:
+        from ..drawing.figures import check_plot
+
+        check_plot(plot)
+    if animation:
+        from ..view.animation import check_animation
+
+        check_animation(animation)
+    make_room(output, plot, animation)
+
+
+def _judge(found: "Sequence[Difference]", reference: str, within: float) -> None:
+    """Say how far each column is off. Raises click.ClickException where one is too far."""
+    wrong = [each for each in found if not each.largest <= within]
+    rows = [
+        (each.column, f"{each.largest:.3g}", f"{each.time:g} s", "FAILED" if each in wrong else "ok") for each in found
+    ]
+    print_table(("column", "largest difference", "at", f"within {within:g}"), rows)
+    if wrong:
+        worst = f"{wrong[0].column} by {wrong[0].largest:.3g} at {wrong[0].time:g} s"
+        raise click.ClickException(f"{len(wrong)} of {len(found)} columns differ from {reference}, most {worst}")
+    OUTPUT.print(f"{len(found)} columns are those of {reference}")
 
 
 def print_result(result: "Result") -> None:
@@ -222,16 +270,14 @@ def print_result(result: "Result") -> None:
 def _print_advice(advice: "Advice") -> None:
     from ..simulation import metres
 
-    table = Table(box=None, pad_edge=False)
-    for title in ("", "setting", "sub-steps", "loads", "time", "off, as told", "off a reference run"):
-        table.add_column(title)
-    for what, tried in (("best", advice.best), ("runner-up", advice.runner_up)):
-        if tried:
-            table.add_row(what, tried.words, f"{tried.substeps}", f"{tried.loads}", f"{1e3 * tried.seconds:.3g} ms",
-                          metres(tried.told), metres(tried.true))  # fmt: skip
+    rows = [
+        (what, tried.words, f"{tried.substeps}", f"{tried.loads}", f"{1e3 * tried.seconds:.3g} ms", metres(tried.told),
+         metres(tried.true))
+        for what, tried in (("best", advice.best), ("runner-up", advice.runner_up)) if tried
+    ]  # fmt: skip
     run = advice.run
     OUTPUT.print(f"{run.title}, {run.stop_time - run.start_time:g} s: at most {metres(advice.within)} off")
-    OUTPUT.print(table)
+    print_table(("", "setting", "sub-steps", "loads", "time", "off, as told", "off a reference run"), rows)
     OUTPUT.print(
         f"a host that holds the inputs over communication steps of {run.communication_step:g} s is "
         f"{metres(advice.held)} off, whatever the method"
@@ -241,7 +287,7 @@ def _print_advice(advice: "Advice") -> None:
 def write(result: "Result", output: Path | None, plot: Path | None) -> None:
     """Write the files that were asked for."""
     if output:
-        OUTPUT.print(f"wrote {result.write_csv(output)}")
+        OUTPUT.print(f"wrote {result.write(output)}")
     if plot:
         from ..view.plots import plot_run
 

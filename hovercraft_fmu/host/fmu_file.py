@@ -100,7 +100,7 @@ def read_description(path: Path, validate: bool = True, model: str | None = None
     try:
         description = fmpy.read_model_description(path, validate=validate)
     except Exception as error:  # a bad archive, bad XML, a bad description: fmpy raises many kinds
-        if _is_ssp(path):
+        if is_ssp(path):
             raise ValueError(
                 f"{path}: is an SSP file, a loop of FMUs: must be an FMU; a co-simulation master runs the loop, and so "
                 "does 'hovercraft-fmu demo --loop'"
@@ -113,7 +113,8 @@ def read_description(path: Path, validate: bool = True, model: str | None = None
     return description
 
 
-def _is_ssp(path: Path) -> bool:
+def is_ssp(path: Path) -> bool:
+    """Whether a file is an SSP file."""
     if not zipfile.is_zipfile(path):
         return False
     with zipfile.ZipFile(path) as archive:

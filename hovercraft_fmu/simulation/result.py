@@ -1,5 +1,6 @@
 """What a run gave: one kind of result, on an FMU or on the bare model."""
 
+import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -147,7 +148,73 @@ class Result:
 
         So it has the rows of `whole`. Raises OSError where it cannot be written.
         """
-        return write_csv(self.data if self.whole is None else self.whole, path)
+        return write_csv(self.all_rows, path)
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write all columns as the ending says, CSV (see `write_csv`) or Parquet, with the same rows.
+
+        Raises:
+            ValueError, ModuleNotFoundError: see `check_output`.
+            OSError: it cannot be written.
+        """
+        path = check_output(path)
+        if path.suffix == ".csv":
+            return self.write_csv(path)
+        arrow, parquet = (import_module(name) for name in ("pyarrow", "pyarrow.parquet"))
+        table = arrow.table({name: np.ascontiguousarray(self.all_rows[name]) for name in self})
+        units = {name: BY_NAME[name].unit or "1" for name in self if name in BY_NAME}
+        table = table.replace_schema_metadata({"units": json.dumps({"time": "s", **units})})
+        with written(path) as unfinished:
+            parquet.write_table(table, unfinished)
+        return path
+
+    @property
+    def all_rows(self) -> NDArray[np.void]:
+        """`whole`, where there is more than `data`."""
+        return self.data if self.whole is None else self.whole
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """For programs: what was run, and what came of it; SI units, angles in radians."""
+        run, off = self.run, self["error.position"] if self.is_estimated else None
+        return {
+            "scene": run.title,
+            "method": run.method,
+            "start_time": run.start_time,
+            "stop_time": float(self["time"][-1]),
+            "communication_step": run.communication_step,
+            "communication_steps": len(self) - 1,
+            "substeps": int(self["substeps"][-1]),
+            "distance": self.distance,
+            "largest_speed": float(self["speed"].max()),
+            "end": {name: self[name][-1].item() for name in self if name != "time"},
+            "estimated_error": None if off is None else {"end": float(off[-1]), "largest": float(off.max())},
+            "warnings": list(self.warnings),
+        }
+
+
+OUTPUTS = (".csv", ".parquet")
+"""What a file of a result may end in."""
+
+
+def check_output(path: str | os.PathLike[str], what: str = "output") -> Path:
+    """The path; so that a run need not be made to learn that it cannot be written.
+
+    Raises:
+        ValueError: the name ends in none of OUTPUTS.
+        ModuleNotFoundError: pyarrow (for Parquet) is not installed; says how to install it.
+    """
+    path = Path(path)
+    if path.suffix not in OUTPUTS:
+        raise ValueError(f"{what} = {str(path)!r}: must end in {' or '.join(OUTPUTS)}")
+    if path.suffix == ".parquet":
+        try:
+            import_module("pyarrow.parquet")
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError(
+                "Parquet needs pyarrow, which is not installed: pip install 'hovercraft-fmu[sweep]'"
+            ) from error
+    return path
 
 
 def path_length(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:

@@ -3,7 +3,7 @@
 import importlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..fmu.near_names import must_be_one_of
 from ..whole import check_writable
@@ -47,20 +47,25 @@ def carry_out(name: str, quick: bool, folder: Path, tell: Callable[[float], None
         ModuleNotFoundError: what it needs is not installed; says how to install it.
         OSError: a file cannot be written; a program that is measured failed.
     """
+    module = ready(name)
+    check_writable(folder / "machine.txt")
+    findings = module.measure(quick, tell)
+    findings.write(folder)
+    report: str = findings.report()
+    return report
+
+
+def ready(name: str) -> Any:
+    """The module that makes a measurement. Raises as `carry_out` does, before the work."""
     if name not in MEASUREMENTS:
         raise ValueError(must_be_one_of("measurement", name, MEASUREMENTS))
     try:
         for package in NEEDED:  # what draws is imported late: it is to be missed before the work
             importlib.import_module(package)
-        module = importlib.import_module(f".{MEASUREMENTS[name].module}", __name__)
+        return importlib.import_module(f".{MEASUREMENTS[name].module}", __name__)
     except ModuleNotFoundError as error:
         if not (error.name or "").startswith(NEEDED):
             raise
         raise ModuleNotFoundError(
             f"measurements need {error.name}, which is not installed: pip install 'hovercraft-fmu[studies]'"
         ) from error
-    check_writable(folder / "machine.txt")
-    findings = module.measure(quick, tell)
-    findings.write(folder)
-    report: str = findings.report()
-    return report

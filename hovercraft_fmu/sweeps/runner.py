@@ -72,6 +72,7 @@ def sweep(
     scheduler: str | None = None,
     tls: tuple[Path | None, Path | None, Path | None] = (None, None, None),
     output: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
     tell: Tell = lambda _: None,
 ) -> Outcome:
     """Make all runs of a study that are not there yet, and write them to Parquet files; see `load`.
@@ -87,6 +88,7 @@ def sweep(
         scheduler: address of a dask.distributed scheduler, as tcp://10.0.0.1:8786, whose workers have this package.
         tls: PEM files to reach a scheduler by tls://: the authority's certificate, one's own, its key.
         output: folder of the results; by default build/sweep/ and the name of the study.
+        overwrite: delete the results that are there, of this or another sweep, before.
         tell: see `Tell`.
 
     Raises:
@@ -97,7 +99,7 @@ def sweep(
     job, about = _job(chosen, fmu, engine)
     if workers is not None and workers < 1:
         raise ValueError(f"workers = {workers}: must be at least 1")
-    with store(Path(output) if output else default_folder(chosen.name), about) as there:
+    with store(Path(output) if output else default_folder(chosen.name), about, overwrite) as there:
         return _made(chosen, there, job, partial(_chunks, workers=workers, scheduler=scheduler, tls=tls), tell)
 
 

@@ -63,7 +63,7 @@ class Store:
         another = [why for why in wrong.values() if why.startswith(ANOTHER)]
         if another and not self.done:
             raise ValueError(
-                f"{folder}: holds the results of {another[0]}: name another folder as output, or delete it"
+                f"{folder}: holds the results of {another[0]}: name another folder as output, or overwrite it"
             )
         for path, why in wrong.items():
             if path.exists():
@@ -80,13 +80,18 @@ class Store:
 
 
 @contextmanager
-def store(folder: Path, about: Mapping[str, Any]) -> Iterator[Store]:
-    """The store, for this process alone. Raises as `Store` does; ValueError: another process has it."""
+def store(folder: Path, about: Mapping[str, Any], overwrite: bool = False) -> Iterator[Store]:
+    """The store, for this process alone; with `overwrite` without the results that are there.
+
+    Raises as `Store` does; ValueError: another process has it.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".lock").open("a+b") as lock:  # the system lets go of it when the process ends, however it does
         _take(lock, folder)
         for left in folder.glob("*/.*.parquet.*[0-9]"):  # of one that was killed
             left.unlink()
+        for path in (*_files(folder, RUNS), *_files(folder, TRAJECTORIES)) if overwrite else ():
+            path.unlink()
         yield Store(folder, about)
 
 
@@ -207,7 +212,7 @@ class Extreme(NamedTuple):
     unit: str
     least: float
     least_run: dict[str, Any]
-    """Swept parameter -> value"""
+    """Swept parameter, with its display unit -> value"""
     greatest: float
     greatest_run: dict[str, Any]
 
@@ -224,10 +229,27 @@ def extremes(folder: str | os.PathLike[str]) -> list[Extreme]:
         shown, factor = display(name)
         places = int(np.nanargmin(values)), int(np.nanargmax(values))
         (low, low_run), (high, high_run) = (
-            (float(values[i]) * factor, {each: runs[each][i].as_py() for each in about["swept"]}) for i in places
+            (float(values[i]) * factor, dict(_shown(each, runs[each][i].as_py()) for each in about["swept"]))
+            for i in places
         )
         found.append(Extreme(name, shown, low, low_run, high, high_run))
     return found
+
+
+def _shown(name: str, value: Any) -> tuple[str, Any]:
+    """A swept parameter as people read it: degrees, where it is an angle."""
+    unit, factor = display(name)
+    return (f"{name} [{unit}]", value * factor) if factor != 1.0 else (name, value)
+
+
+def unreached(folder: str | os.PathLike[str]) -> dict[str, list[int]]:
+    """Event -> the numbers of the runs that never reached it, of the runs that were not refused. Raises as `load`."""
+    runs = load(folder)
+    about = json.loads(runs.schema.metadata[KEY])
+    made = np.array([each is None for each in runs["error"].to_pylist()])
+    events = json.loads(about["study"])["keep"].get("events", {})
+    missed = {name: np.isnan(runs[f"{name}.time"].to_numpy()) & made for name in events}
+    return {name: runs["run"].to_numpy()[where].tolist() for name, where in missed.items() if where.any()}
 
 
 # ---- tables
