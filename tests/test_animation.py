@@ -161,4 +161,5 @@ def test_the_command_animates_one_setting_against_another(fmu: Path, shell: Shel
     ],
 )
 def test_what_is_wrong_is_one_clear_line(fmu: Path, shell: Shell, arguments: tuple[str, ...], message: str) -> None:
-    assert message in shell.refused("simulate", str(fmu), "--stop-time", "1", *arguments)
+    status = 2 if message.startswith("--") else 1
+    assert message in shell.refused("simulate", str(fmu), "--stop-time", "1", *arguments, status=status)
