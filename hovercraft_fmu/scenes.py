@@ -16,8 +16,8 @@ from .model.craft import Craft, preset
 from .model.dynamics import State
 
 Row: TypeAlias = tuple[float, ...]
-"""time [s], thrust [N], port thruster, starboard thruster [1]; and, where there is wind, its x and y [m/s], and a load from
-outside, its x and y [N] and moment [N.m]."""
+"""time [s], thrust [N], port thruster, starboard thruster [1]; and, where there is wind, its x and y [m/s]; and, where
+loads come from outside, their x and y [N] and moment [N.m]."""
 Signals: TypeAlias = NDArray[np.void]
 """Structured array with the fields `time` and names of inputs; linear between rows, a jump is two rows at one time."""
 

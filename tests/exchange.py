@@ -86,5 +86,5 @@ rounded_controls = st.builds(
     Controls,
     numbers(-200.0, 200.0).map(lambda x: round(x, 6)),
     *[st.one_of(st.sampled_from([0.0, 1.0]), numbers(-0.5, 1.5).map(lambda x: round(x, 6)))] * 2,
-    *[st.one_of(st.just(0.0), numbers(-10.0, 10.0).map(lambda x: round(x, 6)))] * 2,
+    *[st.one_of(st.just(0.0), numbers(-10.0, 10.0).map(lambda x: round(x, 6)))] * 5,
 )

@@ -61,6 +61,11 @@ LOAD = {
     "external_force_y": numbers(-200.0, 200.0),
     "external_moment": numbers(-2000.0, 2000.0),
 }
-calm_controls = st.builds(Controls, **COMMANDS)
+NO_WIND, NO_LOAD = dict.fromkeys(WIND, st.just(0.0)), dict.fromkeys(LOAD, st.just(0.0))
+calm_controls = st.builds(Controls, **COMMANDS, **NO_WIND, **NO_LOAD)
 """In air at rest, and with no load from outside."""
-controls = st.one_of(calm_controls, st.builds(Controls, **COMMANDS, **WIND), st.builds(Controls, **COMMANDS, **WIND, **LOAD))
+controls = st.one_of(
+    calm_controls,
+    st.builds(Controls, **COMMANDS, **WIND, **NO_LOAD),
+    st.builds(Controls, **COMMANDS, **WIND, **LOAD),
+)

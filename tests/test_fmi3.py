@@ -30,6 +30,7 @@ OK, WARNING, ERROR = 0, 1, 3
 TERMS: dict[str, dict[str, float | str]] = {
     "none": {},
     "wind": {"wind.x": -0.2, "wind.y": 0.3},
+    "load": {"external.force.x": 1.5, "external.force.y": -2.0, "external.moment": 30.0},
     "directional": {"drag_area": "directional"},
     "friction": {"skirt_friction": 0.002},
     "rotational": {"rotational_drag": 1.0},

@@ -156,7 +156,7 @@ def test_two_thousand_coasting_extremes_lose_energy_with_splitting() -> None:
 
 @given(crafts, states, controls, numbers(1e-4, 1e-3))
 def test_drag_implicit_solves_its_equations(craft: Craft, state: State, asked: Controls, h: float) -> None:
-    """Against numpy's solver on the full 3 x 3 system, in the world frame; wind and loads from outside stand on its right side."""
+    """Against numpy's solver on the full 3 x 3 system, wind and loads from outside stand on its right side."""
     from hovercraft_fmu.model.dynamics import actuation, load_function
 
     *_, kq = load_function(asked, craft)(*state[2:])

@@ -65,6 +65,9 @@ TABLE = {
     "error_estimate_number": ("parameter", "fixed", "exact", None, "0"),
     "error.position": ("output", "discrete", "calculated", "m", None),
     "error.heading": ("output", "discrete", "calculated", "rad", None),
+    "external.force.x": ("input", "continuous", None, "N", "0.0"),
+    "external.force.y": ("input", "continuous", None, "N", "0.0"),
+    "external.moment": ("input", "continuous", None, "N.m", "0.0"),
 }
 
 

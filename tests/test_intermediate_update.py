@@ -23,11 +23,12 @@ from tests.test_native import METHODS
 Inputs = Callable[[float], Sequence[float]]
 STEP = 0.5
 """s, of communication"""
-STEERED = ("thrust", "port_thruster", "wind.y")
+STEERED = ("thrust", "port_thruster", "wind.y", "external.force.x")
 
 
 def steered(time: float) -> list[float]:
-    return [5.0 + 2.0 * math.sin(time), 0.5 + 0.5 * math.sin(0.7 * time), 0.3 * math.cos(0.3 * time)]
+    helm = [5.0 + 2.0 * math.sin(time), 0.5 + 0.5 * math.sin(0.7 * time)]
+    return [*helm, 0.3 * math.cos(0.3 * time), math.cos(time)]
 
 
 def sailed(opened: Fmu, start: dict[str, Any], asked: Inputs | None, held: Inputs | None, step: float) -> list[float]:
@@ -91,9 +92,9 @@ def test_methods_of_higher_order_follow_the_inputs(term: str, opened: Fmu) -> No
 def test_a_host_that_sets_nothing_changes_no_bit(term: str, opened: Fmu) -> None:
     for method in METHODS:
         start = {"integrator": method, "step_size": 0.05, **TERMS[term]}
-        expected = sailed(opened, start, None, lambda _: [8.0, 0.3, 0.0], STEP)
+        expected = sailed(opened, start, None, lambda _: [8.0, 0.3, 0.0, 0.0], STEP)
         with opened.instance(intermediate=Intermediate((), lambda _: ())) as craft:
-            craft.start(start | {"thrust": 8.0, "port_thruster": 0.3, "wind.y": 0.0})
+            craft.start(start | {"thrust": 8.0, "port_thruster": 0.3, "wind.y": 0.0, "external.force.x": 0.0})
             for k in range(8):
                 craft.step(k * STEP, STEP)
             assert craft.port(*STATES).get() == expected, method

@@ -16,7 +16,7 @@ from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL
 from hovercraft_fmu.autopilot.pilot_package import AUTOPILOT
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour, model_description, xml
 from hovercraft_fmu.fmu.extras import RESULT, terminals
-from hovercraft_fmu.fmu.interface import BY_NAME, HOVERCRAFT, INPUTS, STATES
+from hovercraft_fmu.fmu.interface import BY_NAME, EXTERNAL, HOVERCRAFT, INPUTS, STATES
 from hovercraft_fmu.studies.pages import default_result
 from tests.exchange import get_vector, go, put_states
 from tests.lowlevel import DISCARD, ERROR, everything, one, put, start
@@ -263,6 +263,8 @@ def test_a_variable_is_named_terminal_and_member(native3_fmu: Path) -> None:
     assert found == terminals(HOVERCRAFT)
     assert set(found.pop("actuators")) == {"thrust", "port_thruster", "starboard_thruster"}
     assert found["wind"] == {"x": "wind.x", "y": "wind.y"}
+    members = {name.removeprefix("external."): name for name in EXTERNAL}
+    assert found.pop("load") == members
     for terminal, members in found.items():
         assert all(name == f"{terminal}.{member}" and name in BY_NAME for member, name in members.items())
 

@@ -410,7 +410,7 @@ class Oracle(NamedTuple):
 OPERATIONS = st.one_of(
     st.tuples(st.just("step"), numbers(1e-4, 0.05)),
     st.tuples(
-        st.just("inputs"), st.builds(Controls, numbers(-2.0, 12.0), *[numbers(0.0, 1.0)] * 2, *[numbers(-0.3, 0.3)] * 2)
+        st.just("inputs"), st.builds(Controls, numbers(-2.0, 12.0), *[numbers(0.0, 1.0)] * 2, *[numbers(-0.3, 0.3)] * 5)
     ),
     st.tuples(st.just("tune"), numbers(0.0, 2.0)),
     st.tuples(st.just("save"), st.booleans()),

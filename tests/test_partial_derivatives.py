@@ -275,6 +275,7 @@ def test_the_side_that_is_taken_at_a_kink_of_a_parameter(instance: Any) -> None:
 def test_friction_that_begins_at_rest(stepped: Any) -> None:
     """Its slope is that of what is read with a very little of it: linear in it, to a relative error of its size."""
     held = {"thrust": 5.0, "port_thruster": 0.7, "wind__x": 0.4, "wind__y": -0.2, "pose__heading": 0.3}
+    held |= {"external__force__x": 2.0, "external__force__y": -3.0, "external__moment": 20.0}
     little = 1e-7
     rows = INITIAL_UNKNOWNS[3:6]
     read = []
@@ -320,7 +321,7 @@ def test_dependencies_are_where_partial_derivatives_are_not_zero(use: str, descr
     acts = np.zeros((len(unknowns), len(KNOWNS)), dtype=bool)
     for _ in range(20):
         put_states(instance, dice.normal(size=6))
-        instance.setReal([reference(name) for name in INPUTS], [5.0, 0.5, 0.5, *dice.normal(size=2)])
+        instance.setReal([reference(name) for name in INPUTS], [5.0, 0.5, 0.5, *dice.normal(size=5)])
         acts |= jacobian(instance, unknowns) != 0.0
     for unknown in getattr(description, use):
         listed = {variable.name for variable in unknown.dependencies} - set(TUNABLE)
@@ -384,7 +385,7 @@ def test_initial_dependencies_are_where_partial_derivatives_are_not_zero(descrip
         varied = {name: getattr(Craft(), name) * dice.uniform(0.5, 1.0) for name in PARAMETERS}
         varied |= {"skirt_friction": 1e-4, "rotational_drag": dice.uniform(0.1, 0.8), "thrust_min": 1.0}
         craft = Craft(**varied, drag_area=1 + i % 2)
-        state, held = State(*dice.normal(size=6)), Controls((0.0, 3.0, 20.0)[i % 3], 0.5, 0.3, *dice.normal(size=2))
+        state, held = State(*dice.normal(size=6)), Controls((0.0, 3.0, 20.0)[i % 3], 0.5, 0.3, *dice.normal(size=5))
         initialize(stepped, state, held, craft)
         matrix = jacobian(stepped, INITIAL_UNKNOWNS, INITIAL_KNOWNS)
         for row, unknown in zip(matrix, INITIAL_UNKNOWNS, strict=True):

@@ -21,7 +21,11 @@ from ..whole import temporary_folder
 
 COMMUNICATION_STEP = 0.1
 """s"""
-CONTROLS = [(10.0, 0.0, 0.0, 0.0, 0.0)] * 5 + [(10.0, 1.0, 0.0, 0.0, 0.1)] * 10 + [(2.5, 0.0, 0.25, -0.2, 0.0)] * 10
+CONTROLS = [
+    *[(10.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)] * 5,
+    *[(10.0, 1.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0)] * 10,
+    *[(2.5, 0.0, 0.25, -0.2, 0.0, 1.5, -2.5, 12.5)] * 10,
+]
 """One row a communication step, in the order of INPUTS."""
 INPUT_REFERENCES = [BY_NAME[name].reference for name in INPUTS]
 OUTPUT_REFERENCES = [BY_NAME[name].reference for name in OUTPUTS]

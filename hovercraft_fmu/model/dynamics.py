@@ -132,9 +132,7 @@ def load_function(controls: Controls, craft: Craft, per_mass: float = 1.0, per_i
     return _with_external_loads(own, controls, per_mass, per_inertia) if pushed(controls) else own
 
 
-def _with_external_loads(
-    own: LoadFunction, controls: Controls, per_mass: float, per_inertia: float
-) -> LoadFunction:
+def _with_external_loads(own: LoadFunction, controls: Controls, per_mass: float, per_inertia: float) -> LoadFunction:
     """And those from outside, which are in the world frame already."""
     force_x, force_y = controls.external_force_x * per_mass, controls.external_force_y * per_mass
     external_moment = controls.external_moment * per_inertia
@@ -337,7 +335,7 @@ def friction_function(craft: Craft, h: float) -> Friction:
 
 
 def loads(state: State, controls: Controls, craft: Craft) -> Loads:
-    """Force [N, world frame] and moment [N.m] on the craft: thrust, bow thrusters, air drag, loads from outside, friction."""
+    """Force [N, world frame] and moment [N.m] on the craft: thrusters, air drag, what is outside, friction."""
     if not craft.rubs:
         return Loads(*load_function(controls, craft)(*state[2:])[:3])
     if state.vx == 0.0 and state.vy == 0.0 and state.yaw_rate == 0.0:

@@ -276,7 +276,8 @@ def splitting(state: State, controls: Controls, craft: Craft, h: float, n: int) 
     half a step by the approximation above would nearly stop, and the whole one see no drag. What drag takes of w is
     shared by the sway of the craft, 1/(m*M) of it, and its yaw rate, x_d/(I*M).
 
-    Rotational drag, -d*r*|r|, is r/(1 + h*d*|r|/(2*I)) before and after, which is exact. Friction is an implicit step
+    A force from outside, turned into the body frame at the held heading, is a part of T and of the side force, a moment
+    one of the turn. Rotational drag, -d*r*|r|, is r/(1 + h*d*|r|/(2*I)) before and after, which is exact. Friction is an implicit step
     after all that (and after the half one, so that a craft that it holds stays at rest): that lowers the order to 1.
     """
     drag_at = drag_function(craft)
@@ -286,11 +287,13 @@ def splitting(state: State, controls: Controls, craft: Craft, h: float, n: int) 
     per_mass, per_inertia = h / craft.mass, h / craft.inertia
     thrust, side, turn = actuation(controls, craft)
     thrust, side, turn = thrust * per_mass, side * per_mass, turn * per_inertia
-    push = side + x_d * turn
+    loaded, force_x, force_y = pushed(controls), controls.external_force_x * per_mass, controls.external_force_y * per_mass
+    turn = turn + controls.external_moment * per_inertia if loaded else turn
+    ahead, aside, push = thrust, side, side + x_d * turn
     lever = 0.5 * craft.drag_rate
     abeam, of_sway, of_yaw = h * lever, 1.0 / (craft.mass * lever), x_d / craft.inertia / lever
     slowing = half * craft.spin_drag_factor / craft.inertia
-    cos, sin, wind_x, wind_y = math.cos, math.sin, controls.wind_x, controls.wind_y
+    cos, sin, wind_x, wind_y, scene = math.cos, math.sin, controls.wind_x, controls.wind_y, spins or loaded
     drag_rate, spin_rate = craft.drag_rate, craft.spin_rate
 
     def gained(y: float, push: float, z: float) -> float:
@@ -309,28 +312,32 @@ def splitting(state: State, controls: Controls, craft: Craft, h: float, n: int) 
         air_x = vx - wind_x
         air_y = vy - wind_y
         begun = abs(yaw_rate)
-        if spins:
-            yaw_rate = yaw_rate / (1.0 + slowing * abs(yaw_rate))
+        if scene:
+            if loaded:
+                ahead, aside = thrust + (c * force_x + s * force_y), side + (c * force_y - s * force_x)
+                push = aside + x_d * turn
+            if spins:
+                yaw_rate = yaw_rate / (1.0 + slowing * abs(yaw_rate))
         u = c * air_x + s * air_y
         w = c * air_y - s * air_x + yaw_rate * x_d
         kq = drag_at(u, w)
         z_u, z_w = 0.5 * (kq * per_mass), 0.5 * (kq * abeam)
-        half_u = (u + 0.5 * thrust) / (1.0 + (z_u if z_u < MOST else MOST))
+        half_u = (u + 0.5 * ahead) / (1.0 + (z_u if z_u < MOST else MOST))
         half_w = (w + 0.5 * push) / (1.0 + (z_w if z_w < MOST else MOST))
         if rubbed_half:
             lost = w + 0.5 * push - half_w
             surge = half_u + (c * wind_x + s * wind_y)
-            sway = c * vy - s * vx + (0.5 * side - lost * of_sway)
+            sway = c * vy - s * vx + (0.5 * aside - lost * of_sway)
             yaw = yaw_rate + (0.5 * turn - lost * of_yaw)
             surge_left, sway_left, yaw_left = rubbed_half(surge, sway, yaw)
             half_u = half_u + (surge_left - surge)
             half_w = half_w + (sway_left - sway + (yaw_left - yaw) * x_d)
         middle = drag_at(half_u, half_w)
-        gain_u, gain_v, gain_r = thrust, side, turn
+        gain_u, gain_v, gain_r = ahead, aside, turn
         if middle != 0.0:
-            gain_u = gained(u, thrust, middle * per_mass)
+            gain_u = gained(u, ahead, middle * per_mass)
             lost = push - gained(w, push, middle * abeam)
-            gain_v = side - lost * of_sway
+            gain_v = aside - lost * of_sway
             gain_r = turn - lost * of_yaw
         vx = vx + (c * gain_u - s * gain_v)
         vy = vy + (s * gain_u + c * gain_v)

@@ -68,8 +68,8 @@ def advanced(batch: Batch, method: Integrator, state: State, n: int, refined: in
 
 
 def pushes(batch: Batch) -> tuple[Array, Array]:
-    """Force [N] and moment [N.m], by size and at most: of thrust and thrusters, which are drawn inside their limits, and
-    from outside.
+    """Force [N] and moment [N.m], by size and at most: of thrust and thrusters, which are drawn inside their limits,
+    and from outside.
     """
     controls, craft = batch.controls, batch.craft
     command = controls.port - controls.starboard

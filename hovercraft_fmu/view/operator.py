@@ -48,19 +48,22 @@ class Ramp:
 
 
 class Operator:
-    """Controls over time from the keys that are held; the start values of thrust and wind are those of the run."""
+    """Controls over time from the keys that are held; thrust and wind start as in the run, and loads from outside are
+    those of its start.
+    """
 
     def __init__(self, start: Controls, craft: Craft, step: float) -> None:
         self.held: set[Action] = set()
         self._step = step
         self._thrust = Ramp(start.thrust, THRUST_RATE, craft.thrust_min, craft.thrust_max)
         self._wind_x, self._wind_y = Ramp(start.wind_x, WIND_RATE), Ramp(start.wind_y, WIND_RATE)
+        self._outside = start[5:]
 
     @property
     def controls(self) -> Controls:
         """Those of the communication step that begins now."""
         port, starboard = (float(each in self.held) for each in (Action.PORT_THRUSTER, Action.STARBOARD_THRUSTER))
-        return Controls(self._thrust.value, port, starboard, self._wind_x.value, self._wind_y.value)
+        return Controls(self._thrust.value, port, starboard, self._wind_x.value, self._wind_y.value, *self._outside)
 
     def pass_step(self) -> None:
         """One communication step goes by with the keys held as they are."""

@@ -105,7 +105,7 @@ class HovercraftSlave(Slave):
             self._warn_of_rotation(rotation, method)
         if self._companion:
             self._warn_of_error(min(step_size, self._settings.step_size))
-        thrust, port, starboard, _, _ = controls
+        thrust, port, starboard = controls[:3]
         if not (craft.thrust_min <= thrust <= craft.thrust_max and 0.0 <= port <= 1.0 and 0.0 <= starboard <= 1.0):
             self._warn_of_held_inputs()
 

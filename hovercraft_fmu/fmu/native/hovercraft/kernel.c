@@ -155,22 +155,29 @@ double kernel_steering(const struct controls *controls, const struct craft *craf
     return craft->steering_force * (held.port - held.starboard);
 }
 
-struct controls kernel_controls_at(const struct drive *drive, double time)
+/* But for the loads from outside. */
+static ALWAYS_INLINE struct controls ramp_at(const struct drive *drive, double time)
 {
-    if (!drive->varies)
-        return drive->start;
-    if (drive->ask)
-        return drive->ask(drive->asked, drive->later + time);
     return (struct controls){
         .thrust = drive->start.thrust + time * drive->rate.thrust,
         .port = drive->start.port + time * drive->rate.port,
         .starboard = drive->start.starboard + time * drive->rate.starboard,
         .wind_x = drive->start.wind_x + time * drive->rate.wind_x,
         .wind_y = drive->start.wind_y + time * drive->rate.wind_y,
-        .external_force_x = drive->start.external_force_x + time * drive->rate.external_force_x,
-        .external_force_y = drive->start.external_force_y + time * drive->rate.external_force_y,
-        .external_moment = drive->start.external_moment + time * drive->rate.external_moment,
     };
+}
+
+struct controls kernel_controls_at(const struct drive *drive, double time)
+{
+    if (!drive->varies)
+        return drive->start;
+    if (drive->ask)
+        return drive->ask(drive->asked, drive->later + time);
+    struct controls controls = ramp_at(drive, time);
+    controls.external_force_x = drive->start.external_force_x + time * drive->rate.external_force_x;
+    controls.external_force_y = drive->start.external_force_y + time * drive->rate.external_force_y;
+    controls.external_moment = drive->start.external_moment + time * drive->rate.external_moment;
+    return controls;
 }
 
 /* Whether the air moves, now or later in the step, or could. */
@@ -192,13 +199,14 @@ static bool is_pushed(const struct drive *drive)
 }
 
 enum drag_kind { WITHOUT_DRAG, PLAIN_DRAG, ANY_DRAG };
+/* What else there is: a sum of these. */
+enum beside { FRICTION = 1, OUTSIDE = 2 };
 
 /* All that the loads need and that does not change from sub-step to sub-step; `steer` renews the controls' part. Forces
    are times `per_mass`, moments times `per_inertia`: so no division, and no constant factor, stands in a loop. */
 struct load_function {
     enum drag_kind kind;
-    bool slides; /* friction is one of the loads */
-    bool pushed; /* and loads from outside */
+    unsigned beside; /* enum beside: loads in the world frame */
     bool directional;
     double per_mass, per_inertia;
     double k;                  /* kg/m; with the directional area 1, as q then has the two factors in it */
@@ -217,23 +225,31 @@ struct load_function {
     struct trig_turn last; /* of the heading */
 };
 
-static void steer(struct load_function *f, const struct controls *controls)
+static ALWAYS_INLINE void steer(struct load_function *f, const struct controls *controls, bool pushed)
 {
-    const struct controls held = kernel_saturate(controls, f->craft);
-    f->thrust = held.thrust * f->per_mass;
-    f->side = f->craft->steering_force * (held.port - held.starboard) * f->per_mass;
-    f->turn = thruster_moment(f->craft) * (held.port - held.starboard) * f->per_inertia;
-    f->wind_x = held.wind_x;
-    f->wind_y = held.wind_y;
-    f->external_x = held.external_force_x * f->per_mass;
-    f->external_y = held.external_force_y * f->per_mass;
-    f->external_moment = held.external_moment * f->per_inertia;
+    const struct craft *craft = f->craft;
+    const double command = clip(controls->port, 0.0, 1.0) - clip(controls->starboard, 0.0, 1.0);
+    f->thrust = clip(controls->thrust, craft->thrust_min, craft->thrust_max) * f->per_mass;
+    f->side = craft->steering_force * command * f->per_mass;
+    f->turn = thruster_moment(craft) * command * f->per_inertia;
+    f->wind_x = controls->wind_x;
+    f->wind_y = controls->wind_y;
+    if (pushed) {
+        f->external_x = controls->external_force_x * f->per_mass;
+        f->external_y = controls->external_force_y * f->per_mass;
+        f->external_moment = controls->external_moment * f->per_inertia;
+    }
 }
 
 static NEVER_INLINE void steer_now(struct load_function *f, double time)
 {
-    const struct controls controls = kernel_controls_at(f->drive, time);
-    steer(f, &controls);
+    if (f->beside & OUTSIDE) { /* as where somebody is asked */
+        const struct controls controls = kernel_controls_at(f->drive, time);
+        steer(f, &controls, true);
+    } else {
+        const struct controls controls = ramp_at(f->drive, time);
+        steer(f, &controls, false);
+    }
 }
 
 /* The controls at a time [s] after the start. */
@@ -262,8 +278,8 @@ static struct load_function load_function(const struct drive *drive, const struc
     f.x_d = drag_center(craft);
     f.drag_rate = drag_rate(craft);
     f.spin_rate = spin_rate(craft);
-    f.pushed = is_pushed(drive);
-    const bool plain = has_plain_drag(craft) && !is_windy(drive) && !f.pushed;
+    f.beside = is_pushed(drive) ? OUTSIDE : 0;
+    const bool plain = has_plain_drag(craft) && !is_windy(drive) && !f.beside;
     f.kind = f.k == 0.0 ? WITHOUT_DRAG : plain ? PLAIN_DRAG : ANY_DRAG;
     if (f.kind == ANY_DRAG) {
         f.ahead = drag_factor_ahead(craft);
@@ -275,7 +291,7 @@ static struct load_function load_function(const struct drive *drive, const struc
     }
     f.drag = f.k * per_mass;
     f.turning_drag = f.k * f.x_d * per_inertia;
-    steer(&f, &drive->start);
+    steer(&f, &drive->start, f.beside & OUTSIDE);
     return f;
 }
 
@@ -284,7 +300,7 @@ static struct load_function sliding_load_function(const struct drive *drive, con
                                                   double per_mass, double per_inertia)
 {
     struct load_function f = load_function(drive, craft, per_mass, per_inertia);
-    f.slides = true;
+    f.beside |= FRICTION;
     f.radius = kernel_friction_radius(craft).radius;
     f.grip = friction_force(craft) * per_mass;
     f.turning_grip = friction_force(craft) * f.radius * per_inertia;
@@ -325,9 +341,9 @@ static double slip_speed(double vx, double vy, double turning)
     return square_root(vx * vx + vy * vy + turning * turning);
 }
 
-/* For a kind, and a sliding, that the compiler may know. */
-static ALWAYS_INLINE struct loads loads_as(struct load_function *f, enum drag_kind kind, bool slides, double heading,
-                                           double vx, double vy, double yaw_rate)
+/* For a kind, and what is beside, that the compiler may know. */
+static ALWAYS_INLINE struct loads loads_as(struct load_function *f, enum drag_kind kind, unsigned beside,
+                                           double heading, double vx, double vy, double yaw_rate)
 {
     const struct trig_pair turned = sine_cosine(heading, &f->last);
     const double c = turned.cosine, s = turned.sine;
@@ -343,12 +359,14 @@ static ALWAYS_INLINE struct loads loads_as(struct load_function *f, enum drag_ki
             moment = moment - f->spin * yaw_rate * fabs(yaw_rate);
         loads = (struct loads){c * force_x - s * force_y, s * force_x + c * force_y, moment, f->k * air.q};
     }
-    if (kind != PLAIN_DRAG && f->pushed) {
+    if (!beside)
+        return loads;
+    if (beside & OUTSIDE) {
         loads.x = loads.x + f->external_x;
         loads.y = loads.y + f->external_y;
         loads.moment = loads.moment + f->external_moment;
     }
-    if (slides) {
+    if (beside & FRICTION) {
         const double turning = f->radius * yaw_rate;
         const double slowness = 1.0 / larger(slip_speed(vx, vy, turning), LEAST_SLIP);
         loads.x = loads.x - f->grip * slowness * vx;
@@ -360,7 +378,7 @@ static ALWAYS_INLINE struct loads loads_as(struct load_function *f, enum drag_ki
 
 static struct loads loads_at(struct load_function *f, double heading, double vx, double vy, double yaw_rate)
 {
-    return loads_as(f, f->kind, f->slides, heading, vx, vy, yaw_rate);
+    return loads_as(f, f->kind, f->beside, heading, vx, vy, yaw_rate);
 }
 
 /* How much of v, and of rho*r, friction can take away in a time [m/s]. */
@@ -425,7 +443,7 @@ struct loads kernel_loads_on(const struct state *state, const struct controls *c
     struct load_function f =
         rubs(craft) ? sliding_load_function(&drive, craft, 1.0, 1.0) : load_function(&drive, craft, 1.0, 1.0);
     if (rubs(craft) && state->vx == 0.0 && state->vy == 0.0 && state->yaw_rate == 0.0) {
-        f.slides = false;
+        f.beside &= OUTSIDE;
         return loads_at_rest(&f, state->heading);
     }
     return loads_at(&f, state->heading, state->vx, state->vy, state->yaw_rate);
@@ -486,15 +504,15 @@ static struct stretch stretch_of(struct load_function *f, const struct state *s,
     return watched_stretch(f, s, n, h, watch);
 }
 
-static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, const struct state *state, struct load_function *f,
-                                             double h, int64_t n)
+static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, unsigned beside, const struct state *state,
+                                             struct load_function *f, double h, int64_t n)
 {
     const struct friction friction = friction_function(f->craft, h);
     struct state s = *state;
     struct watch watch = {0.0, s.yaw_rate, s.yaw_rate};
     for (int64_t i = 0; i < n; i++) {
         steer_at(f, (double)i * h);
-        const struct loads push = loads_as(f, kind, false, s.heading, s.vx, s.vy, s.yaw_rate);
+        const struct loads push = loads_as(f, kind, beside, s.heading, s.vx, s.vy, s.yaw_rate);
         watch_loads(&watch, f, kind, push.kq, s.yaw_rate);
         s.vx = s.vx + push.x;
         s.vy = s.vy + push.y;
@@ -513,7 +531,25 @@ static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, const struct s
    costs nothing. */
 static struct stretch semi_implicit_euler(const struct state *state, struct load_function *f, double h, int64_t n)
 {
-    return f->kind == PLAIN_DRAG ? euler_as(PLAIN_DRAG, state, f, h, n) : euler_as(f->kind, state, f, h, n);
+    if (f->kind == PLAIN_DRAG)
+        return euler_as(PLAIN_DRAG, 0, state, f, h, n);
+    return euler_as(f->kind == WITHOUT_DRAG ? WITHOUT_DRAG : ANY_DRAG, f->beside, state, f, h, n);
+}
+
+/* Ahead, abeam and turning, at a heading: the craft's own push, and what comes from outside. */
+struct push {
+    double ahead, abeam, turn;
+};
+
+static ALWAYS_INLINE struct push push_at(const struct load_function *f, unsigned beside, double c, double s)
+{
+    struct push push = {f->thrust, f->side, f->turn};
+    if (beside & OUTSIDE) {
+        push.ahead = push.ahead + (c * f->external_x + s * f->external_y);
+        push.abeam = push.abeam + (c * f->external_y - s * f->external_x);
+        push.turn = push.turn + f->external_moment;
+    }
+    return push;
 }
 
 static struct stretch drag_implicit(const struct state *state, struct load_function *f, double h, int64_t n)
@@ -521,6 +557,7 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
     const double mass = f->craft->mass, inertia = f->craft->inertia, x_d = f->x_d;
     const double spin = spin_drag_factor(f->craft), arm = mass * x_d * x_d, square = x_d * x_d;
     const bool in_wind = is_windy(f->drive), spins = f->craft->rotational_drag != 0.0;
+    const bool scene = in_wind || spins || f->beside;
     const struct friction friction = friction_function(f->craft, h);
     double damped = inertia;
     struct state z = *state;
@@ -532,26 +569,24 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
         const double kq = f->k * air_at(f, f->kind, c, s, z.vx, z.vy, z.yaw_rate).q;
         const double g = h * kq;
         watch_loads(&watch, f, f->kind, kq, z.yaw_rate);
-        if (in_wind) {
-            z.vx = z.vx - f->wind_x;
-            z.vy = z.vy - f->wind_y;
-        }
-        if (spins)
-            damped = inertia + h * spin * fabs(z.yaw_rate);
-        double ahead = f->thrust, abeam = f->side, turn = f->turn;
-        if (f->pushed) {
-            ahead = ahead + (c * f->external_x + s * f->external_y);
-            abeam = abeam + (c * f->external_y - s * f->external_x);
-            turn = turn + f->external_moment;
+        struct push push = push_at(f, 0, c, s);
+        if (scene) {
+            if (in_wind) {
+                z.vx = z.vx - f->wind_x;
+                z.vy = z.vy - f->wind_y;
+            }
+            if (spins)
+                damped = inertia + h * spin * fabs(z.yaw_rate);
+            push = push_at(f, f->beside, c, s);
         }
         const double v = c * z.vy - s * z.vx;
-        const double b = inertia * z.yaw_rate + h * turn;
-        const double e = x_d * (mass * v + h * abeam) - b;
+        const double b = inertia * z.yaw_rate + h * push.turn;
+        const double e = x_d * (mass * v + h * push.abeam) - b;
         const double determinant = mass * damped + g * (damped + arm);
         const double kept = mass / (mass + g);
-        const double surge = h * ahead / (mass + g);
+        const double surge = h * push.ahead / (mass + g);
         const double sway =
-            ((damped + g * square) * (h * abeam) + g * x_d * (x_d * (g * kept) * v - b)) / determinant;
+            ((damped + g * square) * (h * push.abeam) + g * x_d * (x_d * (g * kept) * v - b)) / determinant;
         z.yaw_rate = (mass * b - g * e) / determinant;
         z.vx = kept * z.vx + (c * surge - s * sway);
         z.vy = kept * z.vy + (s * surge + c * sway);
@@ -570,7 +605,7 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
 }
 
 /* Of accelerations. */
-static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, bool slides, const struct state *state,
+static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, unsigned beside, const struct state *state,
                                            struct load_function *f, double h, int64_t n)
 {
     const double half = 0.5 * h, sixth = h / 6.0, square = h * h / 6.0;
@@ -579,17 +614,17 @@ static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, bool slides, con
     for (int64_t i = 0; i < n; i++) {
         const double t = (double)i * h;
         steer_at(f, t);
-        const struct loads a1 = loads_as(f, kind, slides, s.heading, s.vx, s.vy, s.yaw_rate);
+        const struct loads a1 = loads_as(f, kind, beside, s.heading, s.vx, s.vy, s.yaw_rate);
         const double r2 = s.yaw_rate + half * a1.moment;
         steer_at(f, t + half);
-        const struct loads a2 = loads_as(f, kind, slides, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
+        const struct loads a2 = loads_as(f, kind, beside, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
                                                  s.vy + half * a1.y, r2);
         const double r3 = s.yaw_rate + half * a2.moment;
         const struct loads a3 =
-            loads_as(f, kind, slides, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
+            loads_as(f, kind, beside, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
         const double r4 = s.yaw_rate + h * a3.moment;
         steer_at(f, t + h);
-        const struct loads a4 = loads_as(f, kind, slides, s.heading + h * r3, s.vx + h * a3.x,
+        const struct loads a4 = loads_as(f, kind, beside, s.heading + h * r3, s.vx + h * a3.x,
                                                  s.vy + h * a3.y, r4);
         watch_loads(&watch, f, kind, a1.kq, s.yaw_rate);
         watch_loads(&watch, f, kind, a2.kq, r2);
@@ -611,8 +646,8 @@ static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, bool slides, con
 
 static struct stretch smooth_rk4(const struct state *state, struct load_function *f, double h, int64_t n)
 {
-    return f->kind == PLAIN_DRAG && !f->slides ? rk4_as(PLAIN_DRAG, false, state, f, h, n)
-                                               : rk4_as(f->kind, f->slides, state, f, h, n);
+    return f->kind == PLAIN_DRAG && !f->beside ? rk4_as(PLAIN_DRAG, 0, state, f, h, n)
+                                               : rk4_as(f->kind, f->beside, state, f, h, n);
 }
 
 /* While it slides, friction is a load like others. Near rest it is not: an implicit step of Euler's. */
@@ -664,14 +699,14 @@ static ALWAYS_INLINE double gained(double y, double push, double rate)
 }
 
 /* What friction leaves of the motion in the middle of a sub-step, from a state and its velocity through the air. */
-static struct air rubbed_half(const struct load_function *f, const struct relaxation *r,
+static struct air rubbed_half(const struct load_function *f, const struct relaxation *r, const struct push *push,
                               const struct friction *friction, double c, double s, const struct state *z,
                               const struct air *air, const struct air *half)
 {
     const double lost = air->w + 0.5 * r->push - half->w;
     const double surge = half->u + (c * f->wind_x + s * f->wind_y);
-    const double sway = c * z->vy - s * z->vx + (0.5 * f->side - lost * r->of_sway);
-    const double yaw = z->yaw_rate + (0.5 * f->turn - lost * r->of_yaw);
+    const double sway = c * z->vy - s * z->vx + (0.5 * push->abeam - lost * r->of_sway);
+    const double yaw = z->yaw_rate + (0.5 * push->turn - lost * r->of_yaw);
     double surge_left = surge, sway_left = sway, yaw_left = yaw;
     rub(friction, &surge_left, &sway_left, &yaw_left);
     return (struct air){
@@ -681,7 +716,7 @@ static struct air rubbed_half(const struct load_function *f, const struct relaxa
 }
 
 /* Of loads in the time h. */
-static ALWAYS_INLINE struct stretch splitting_as(enum drag_kind kind, const struct state *state,
+static ALWAYS_INLINE struct stretch splitting_as(enum drag_kind kind, unsigned beside, const struct state *state,
                                                  struct load_function *f, double h, int64_t n)
 {
     const double half = 0.5 * h, lever = 0.5 * f->drag_rate;
@@ -698,29 +733,30 @@ static ALWAYS_INLINE struct stretch splitting_as(enum drag_kind kind, const stru
     struct watch watch = {0.0, z.yaw_rate, z.yaw_rate};
     for (int64_t i = 0; i < n; i++) {
         steer_at(f, (double)i * h + half);
-        r.push = f->side + f->x_d * f->turn;
         z.x = z.x + half * z.vx;
         z.y = z.y + half * z.vy;
         z.heading = z.heading + half * z.yaw_rate;
         const struct trig_pair turned = sine_cosine(z.heading, &f->last);
         const double c = turned.cosine, s = turned.sine, begun = fabs(z.yaw_rate);
+        const struct push push = push_at(f, beside, c, s);
+        r.push = push.abeam + f->x_d * push.turn;
         if (spins)
             z.yaw_rate = z.yaw_rate / (1.0 + slowing * fabs(z.yaw_rate));
         const struct air air = air_at(f, kind, c, s, z.vx, z.vy, z.yaw_rate);
         const double kq = kind == WITHOUT_DRAG ? 0.0 : f->k * air.q;
         struct air middle = {
-            .u = (air.u + 0.5 * f->thrust) / (1.0 + at_most(0.5 * (kq * r.ahead))),
+            .u = (air.u + 0.5 * push.ahead) / (1.0 + at_most(0.5 * (kq * r.ahead))),
             .w = (air.w + 0.5 * r.push) / (1.0 + at_most(0.5 * (kq * r.abeam))),
         };
         if (friction.rubs)
-            middle = rubbed_half(f, &r, &of_half, c, s, &z, &air, &middle);
+            middle = rubbed_half(f, &r, &push, &of_half, c, s, &z, &air, &middle);
         const double then = kind == WITHOUT_DRAG ? 0.0 : f->k * air_speed(f, kind, middle.u, middle.w);
-        double surge = f->thrust, sway = f->side, yaw = f->turn;
+        double surge = push.ahead, sway = push.abeam, yaw = push.turn;
         if (then != 0.0) {
             const double lost = r.push - gained(air.w, r.push, then * r.abeam);
-            surge = gained(air.u, f->thrust, then * r.ahead);
-            sway = f->side - lost * r.of_sway;
-            yaw = f->turn - lost * r.of_yaw;
+            surge = gained(air.u, push.ahead, then * r.ahead);
+            sway = push.abeam - lost * r.of_sway;
+            yaw = push.turn - lost * r.of_yaw;
         }
         z.vx = z.vx + (c * surge - s * sway);
         z.vy = z.vy + (s * surge + c * sway);
@@ -740,7 +776,8 @@ static ALWAYS_INLINE struct stretch splitting_as(enum drag_kind kind, const stru
 
 static struct stretch splitting(const struct state *state, struct load_function *f, double h, int64_t n)
 {
-    return f->kind == PLAIN_DRAG ? splitting_as(PLAIN_DRAG, state, f, h, n) : splitting_as(f->kind, state, f, h, n);
+    return f->kind == PLAIN_DRAG ? splitting_as(PLAIN_DRAG, 0, state, f, h, n)
+                                 : splitting_as(f->kind, f->beside, state, f, h, n);
 }
 
 enum { STAGES = 7 };
