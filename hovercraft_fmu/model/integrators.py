@@ -277,8 +277,9 @@ def splitting(state: State, controls: Controls, craft: Craft, h: float, n: int) 
     shared by the sway of the craft, 1/(m*M) of it, and its yaw rate, x_d/(I*M).
 
     A force from outside, turned into the body frame at the held heading, is a part of T and of the side force, a moment
-    one of the turn. Rotational drag, -d*r*|r|, is r/(1 + h*d*|r|/(2*I)) before and after, which is exact. Friction is an implicit step
-    after all that (and after the half one, so that a craft that it holds stays at rest): that lowers the order to 1.
+    one of the turn. Rotational drag, -d*r*|r|, is r/(1 + h*d*|r|/(2*I)) before and after, which is exact. Friction is an
+    implicit step after all that (and after the half one, so that a craft that it holds stays at rest): that lowers the
+    order to 1.
     """
     drag_at = drag_function(craft)
     rubbed = friction_function(craft, h) if craft.rubs else None
@@ -287,7 +288,11 @@ def splitting(state: State, controls: Controls, craft: Craft, h: float, n: int) 
     per_mass, per_inertia = h / craft.mass, h / craft.inertia
     thrust, side, turn = actuation(controls, craft)
     thrust, side, turn = thrust * per_mass, side * per_mass, turn * per_inertia
-    loaded, force_x, force_y = pushed(controls), controls.external_force_x * per_mass, controls.external_force_y * per_mass
+    loaded, force_x, force_y = (
+        pushed(controls),
+        controls.external_force_x * per_mass,
+        controls.external_force_y * per_mass,
+    )
     turn = turn + controls.external_moment * per_inertia if loaded else turn
     ahead, aside, push = thrust, side, side + x_d * turn
     lever = 0.5 * craft.drag_rate

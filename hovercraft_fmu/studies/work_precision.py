@@ -112,7 +112,7 @@ def bare(run: Run, points: Points) -> Ready[Reached]:
 
 
 def through(instance: Instance, run: Run, points: Points) -> Ready[Reached]:
-    """The whole run through fmpy: three inputs (or all, if others act), a step, outputs at every communication point."""
+    """The whole run through fmpy: three inputs (or all), a step, the outputs at every communication point."""
     driven = INPUTS if any(any(controls[3:]) for _, _, controls in points) else INPUTS[:3]
     inputs, outputs, states = instance.port(*driven), instance.port(*OUTPUTS), instance.port(*STATES)
     steps = [(time, end - time, controls[: len(driven)]) for time, end, controls in points]
