@@ -198,18 +198,37 @@ def test_a_change_of_settings_goes_on_from_where_the_craft_is(opened: Opened, na
     """And that replays, too: the state is in the command."""
     made = opened("scale=50")
     made.keyboard.down("ArrowUp")
-    made.wait_for_function("hovercraft.page.flight.time > 20")
+    made.wait_for_function("hovercraft.page.flight.see().craft['pose.x'] > 2")
     before = made.evaluate("hovercraft.page.flight.craft.get('pose.x')['pose.x']")
     made.locator("#integrator").select_option("drag_implicit")
     made.wait_for_function("hovercraft.page.flight.steps > 100")
     made.keyboard.press(" ")
-    assert made.evaluate("hovercraft.page.flight.values['pose.x']") >= before > 1.0
+    assert made.evaluate("hovercraft.page.flight.values['pose.x']") >= before > 2.0
     (shell.folder / "hovercraft.csv").write_text(made.evaluate("hovercraft.page.flight.log()"))
     words = shlex.split(made.locator("#command").input_value())
     shell.ok(*words[1:2], str(native_fmu), *words[2:], "--output", "out.csv")
     with (shell.folder / "out.csv").open() as out:
         last = list(csv.DictReader(out))[-1]
     assert {name: float(last[name]) for name in READ} == made.evaluate(SEEN, READ)
+
+
+def test_a_scene_that_is_played_replays(opened: Opened, native_fmu: Path, shell: Shell) -> None:
+    """With its inputs held, as they were; ended, it is played again by a reset."""
+    made = opened("scene=slalom&step_size=0.1&scale=200")
+    expect(made.locator("#paused")).to_be_visible()
+    assert made.evaluate("hovercraft.page.flight.time") == 60.0
+    (shell.folder / "hovercraft.csv").write_text(made.evaluate("hovercraft.page.flight.log()"))
+    words = shlex.split(made.locator("#command").input_value())
+    shell.ok(*words[1:2], str(native_fmu), *words[2:], "--output", "out.csv")
+    with (shell.folder / "out.csv").open() as out:
+        last = list(csv.DictReader(out))[-1]
+    seen = made.evaluate(SEEN, READ)
+    assert {name: float(last[name]) for name in READ} == seen
+    made.get_by_role("button", name="Reset").click()
+    assert made.evaluate("hovercraft.page.flight.steps") == 0
+    made.get_by_role("button", name="Go on").click()
+    made.wait_for_function("hovercraft.page.flight.time === 60")
+    assert made.evaluate(SEEN, READ) == seen
 
 
 THIRTY_MINUTES = """([from, to]) => {
@@ -293,6 +312,8 @@ def test_a_link_brings_the_settings_back(opened: Opened) -> None:
     made.locator("#scale").select_option("50")
     made.get_by_label("skirt friction").check()
     made.locator("#term-wind").check()
+    fields = made.evaluate("[...document.querySelectorAll('#inputs input')].map((each) => each.id)")
+    assert fields == [f"input-{name}" for name in INPUTS[3:]]
     link = made.evaluate("location.hash").removeprefix("#")
     settings = made.evaluate("hovercraft.page.settings")
     assert settings["inputs"] == {"wind.y": 0.5}
@@ -400,3 +421,21 @@ def test_the_modules_are_one_script(file: Path) -> None:
     assert not re.search(r"^(import|export) ", text, re.MULTILINE)
     for name in FOLDER.glob("*.js"):
         assert name.read_text(encoding="utf-8").splitlines()[0] in text, name
+
+
+def test_the_command_writes_it_and_opens_it(file: Path, shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it goes is said; a browser that does not start, too."""
+    asked: list[str] = []
+
+    def opens(address: str) -> bool:
+        asked.append(address)
+        return len(asked) > 1
+
+    monkeypatch.setattr("webbrowser.open", opens)
+    assert "no browser" in shell.ok("play")
+    assert (shell.folder / "build" / "play.html").read_bytes() == file.read_bytes()
+    assert asked == [(shell.folder / "build" / "play.html").resolve().as_uri()]
+    assert "no browser" not in shell.ok("play", "--output", "own.html")
+    shell.ok("play", "--no-open")
+    assert len(asked) == 2
+    assert "must end in .html" in shell.refused("play", "--output", "play.htm")

@@ -47,6 +47,7 @@ class Page {
     };
     this.controls = new Controls(actions, data, description, () => this.settings);
     this.flight = this.begun({}, 0);
+    this.fromStart = true;
     const touch = matchMedia("(any-pointer: coarse)").matches || navigator.maxTouchPoints > 0;
     element("pads").hidden = !touch;
     element("sea").classList.toggle("touch", touch);
@@ -92,27 +93,36 @@ class Page {
 
   /** Another flight: from where the craft is, or from the start. @param {boolean} fromStart */
   begin(fromStart) {
-    const { flight } = this, held = flight.source instanceof Helm ? [...flight.source.held] : [];
-    const state = fromStart ? {} : flight.craft.get(...STATES), thrust = fromStart ? 0 : flight.inputs.thrust;
+    const { flight } = this, held = this.held(), state = fromStart ? {} : flight.craft.get(...STATES);
     this.clearNotices();
     try {
-      const next = this.begun(state, thrust);
-      flight.free();
-      this.flight = next;
-      this.stale = true;
-      this.failed = "";
+      this.flight = this.begun(state, fromStart ? 0 : flight.inputs.thrust);
     } catch (error) {
       this.fail(error);
       return;
     }
-    if (this.flight.source instanceof Helm)
-      held.forEach((what) => this.act(what, 1));
-    if (fromStart)
+    flight.free();
+    this.fromStart = fromStart;
+    this.begunAgain(held);
+    this.showCommand();
+  }
+
+  /** What is seen and counted begins anew; keys that are held go on. @param {string[]} held */
+  begunAgain(held) {
+    held.forEach((what) => this.act(what, 1));
+    if (this.fromStart)
       this.picture.clear();
+    if (this.fromStart && this.course)
+      this.course = new Course(pose(this.flight.see().craft));
     this.chart.clear();
+    this.failed = "";
+    this.stale = true;
     Object.assign(this.last, { cost: 0, time: 0, wall: 0, substeps: 0 });
     this.pace.restart(performance.now() / 1000);
-    this.showCommand();
+  }
+
+  held() {
+    return this.flight.source instanceof Helm ? [...this.flight.source.held] : [];
   }
 
   // ---- what a person does
@@ -141,21 +151,17 @@ class Page {
     this.advance(1);
   }
 
+  /** Back to the start: where the flight began there, by its saved state. */
   reset() {
-    const { flight } = this, held = flight.source instanceof Helm ? flight.source.held : new Set();
-    if (this.failed || Object.keys(flight.values).some((name) => STATES.includes(name)) !== Boolean(sceneOf(this.settings, this.data)?.values["velocity.x"]))
-      return this.begin(true);
+    const { flight } = this, held = this.held();
+    if (!this.fromStart) {
+      this.begin(true);
+      return;
+    }
     this.thrust = 0;
     flight.reset(this.newSource(flight.values));
-    held.forEach((what) => this.act(what, 1));
     this.clearNotices();
-    this.stale = true;
-    this.picture.clear();
-    this.chart.clear();
-    if (this.course)
-      this.course = new Course({ x: 0, y: 0, heading: 0 });
-    Object.assign(this.last, { cost: 0, time: 0, wall: 0, substeps: 0 });
-    this.pace.restart(performance.now() / 1000);
+    this.begunAgain(held);
   }
 
   toggleGates() {
@@ -172,9 +178,11 @@ class Page {
     this.settings = { ...before, ...change };
     this.settled();
     this.pace.restart(performance.now() / 1000);
-    const fromStart = change.scene !== undefined && change.scene !== before.scene || change.preset !== undefined && change.preset !== before.preset;
+    const differs = (/** @type {keyof typeof before} */ name) => this.settings[name] !== before[name];
     if (Object.keys(change).some((name) => name !== "scale" && name !== "view"))
-      this.begin(fromStart);
+      this.begin(differs("scene") || differs("preset") || this.settings.scene !== "");
+    if (this.paused && this.flight.steps === 0 && this.fromStart)
+      this.pause();
   }
 
   settled() {
