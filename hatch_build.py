@@ -30,21 +30,21 @@ class MachineCodeHook(BuildHookInterface):  # type: ignore[type-arg, misc, unuse
 
     def dependencies(self) -> list[str]:
         """The compiler, where it can be had and is needed."""
-        code = _machine_code(self.root)
-        if os.environ.get(code.LEAVE_OUT) or not any(each.missing for each in code.libraries()):
+        code, all_of_it = (_module(self.root, name) for name in ("fmu.machine_code", "libraries"))
+        if os.environ.get(code.LEAVE_OUT) or not any(each.missing for each in all_of_it.libraries()):
             return []
         return ["==".join(code.COMPILER)] if any(tag.platform in HAVE_COMPILER for tag in sys_tags()) else []
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002 - hatchling's
         """Compile."""
-        if reason := _machine_code(self.root).compile_all():
+        if reason := _module(self.root, "libraries").compile_libraries():
             self.app.display_warning(f"no machine code of the native FMUs: {reason}")
 
 
-def _machine_code(root: str) -> Any:
-    """The module of the package, which needs nothing that is not installed yet."""
+def _module(root: str, name: str) -> Any:
+    """A module of the package that needs nothing which is not installed yet."""
     sys.path.insert(0, root)
-    return import_module("hovercraft_fmu.fmu.machine_code")
+    return import_module(f"hovercraft_fmu.{name}")
 
 
 class ReadmeHook(MetadataHookInterface):  # type: ignore[misc, unused-ignore]

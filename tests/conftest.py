@@ -15,9 +15,10 @@ from hypothesis import settings
 from hovercraft_fmu import advance_fleet, build
 from hovercraft_fmu.autopilot.pilot_package import build_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
-from hovercraft_fmu.fmu.machine_code import BROWSER, TARGETS, NotCompiledError, compile_all
+from hovercraft_fmu.fmu.machine_code import BROWSER, TARGETS, NotCompiledError
 from hovercraft_fmu.fmu.native_package import build_native_fmu
 from hovercraft_fmu.fmu.python_package import build_fmu
+from hovercraft_fmu.libraries import compile_libraries
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from tests.lowlevel import one
@@ -71,7 +72,7 @@ def _compiled(flavour: Flavour, name: str, built: Built, platforms: Collection[s
     """A native FMU; C that was changed since it was compiled is compiled again, where the compiler is installed."""
 
     def make(path: Path) -> Path:
-        compile_all(platforms)
+        compile_libraries(platforms)
         if BROWSER in platforms:  # as the package builds it
             return build("native" if flavour is NATIVE else "native3", path)
         return build_native_fmu(path, flavour, platforms)
@@ -93,7 +94,7 @@ def fleet(built: Built) -> None:
     """The compiled library of many craft, of this machine."""
 
     def make(path: Path) -> Path:
-        compile_all(HERE[sys.platform])
+        compile_libraries(HERE[sys.platform])
         path.touch()
         return path
 

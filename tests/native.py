@@ -34,7 +34,7 @@ from hovercraft_fmu.scenes import SCENES
 
 C_TESTS = Path(__file__).parent / "c"
 C_FOLDERS = tuple(f"-I{folder}" for folder in c_folders())
-KERNEL_FILES = tuple(c_file(f"{name}.c") for name in ("kernel", "trig", "logarithm"))
+KERNEL_FILES = (*(c_file(f"{name}.c") for name in ("kernel", "trig", "logarithm")), C_TESTS / "rounding_of.c")
 C_INCLUDES = ("-I", str(Path(elsewhere.__file__).parent))
 """Of the calls of both standards."""
 OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
@@ -136,7 +136,7 @@ class Kernel:
         self.library: Any = CDLL(str(library))
         self.library.kernel_loads_on.restype = CLoads
         self.library.kernel_estimated_error.restype = CError
-        for function, arguments in ((self.library.kernel_rounding, 3), (self.library.kernel_meant_step, 4)):
+        for function, arguments in ((self.library.rounding_of, 3), (self.library.kernel_meant_step, 4)):
             function.restype, function.argtypes = c_double, (c_double,) * arguments
 
     def advance(
@@ -186,7 +186,7 @@ class Kernel:
 
     def rounding(self, *arguments: float) -> float:
         """As in subcycling.py."""
-        return float(self.library.kernel_rounding(*arguments))
+        return float(self.library.rounding_of(*arguments))
 
     def meant_step(self, *arguments: float) -> float:
         """As in subcycling.py."""

@@ -16,6 +16,7 @@ FLOORS = (
     ("stopping",),
     ("fmu",),
     ("autopilot", "scenes"),
+    ("libraries",),
     ("view.page",),
     ("building",),
     ("host", "drawing"),

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from hovercraft_fmu import cli
+from hovercraft_fmu import cli, libraries
 from hovercraft_fmu.building import PRODUCTS, build
 from hovercraft_fmu.fmu import machine_code
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3
-from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, compile_all, library
+from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, library
+from hovercraft_fmu.libraries import compile_libraries
 
 
 @pytest.fixture
@@ -26,7 +27,7 @@ def nothing_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def one_platform(monkeypatch: pytest.MonkeyPatch) -> None:
     """And one library, instead of all, which take long."""
     monkeypatch.setattr(machine_code, "PLATFORMS", {"x86_64-linux": PLATFORMS["x86_64-linux"]})
-    monkeypatch.setattr(machine_code, "libraries", lambda: [library(NATIVE)])
+    monkeypatch.setattr(libraries, "libraries", lambda: [library(NATIVE)])
 
 
 def files_of(folder: Path) -> set[str]:
@@ -38,7 +39,7 @@ def test_changed_c_is_never_run_as_old_machine_code(tmp_path: Path, monkeypatch:
     changed = tmp_path / "native"
     shutil.copytree(machine_code.C_FOLDER, changed)
     monkeypatch.setattr(machine_code, "C_FOLDER", changed)
-    if reason := compile_all():
+    if reason := compile_libraries():
         pytest.skip(reason)
     old = library(NATIVE).path("x86_64-linux")
     assert old.exists()
@@ -46,12 +47,12 @@ def test_changed_c_is_never_run_as_old_machine_code(tmp_path: Path, monkeypatch:
         file.write("/* changed */\n")
     with pytest.raises(NotCompiledError, match=r"the C was changed since.*pip install -e"):
         library(NATIVE).path("x86_64-linux")
-    assert compile_all() == ""
+    assert compile_libraries() == ""
     last = library(NATIVE).path("x86_64-linux")
     assert last.exists()
     assert not old.exists()
     (changed / "hovercraft" / "kernel.c").write_text("#error on purpose\n")
-    assert "on purpose" in compile_all()
+    assert "on purpose" in compile_libraries()
     with pytest.raises(NotCompiledError, match=r"compiling .* for x86_64-linux-gnu\.2\.17 failed: .*on purpose"):
         library(NATIVE).path("x86_64-linux")
     assert last.exists()  # the last good state: taking the change back is enough
@@ -60,9 +61,12 @@ def test_changed_c_is_never_run_as_old_machine_code(tmp_path: Path, monkeypatch:
 def test_both_flavours_share_a_unit_that_is_compiled_once() -> None:
     """The compiler's cache goes by the content of all that it reads."""
     units = {name: library(flavour).files for name, flavour in (("2", NATIVE), ("3", NATIVE3))}
-    shared = {name: {path: f for path, f in files.items() if "shared/" in path} for name, files in units.items()}
-    assert library(NATIVE).sources[0] == library(NATIVE3).sources[0] == "shared/shared.c"
-    assert {"shared/shared.c", "shared/kernel.c", "shared/variables.h"} <= shared["2"].keys()
+    shared = {
+        name: {path: f for path, f in files.items() if path.startswith("shared_hovercraft/")}
+        for name, files in units.items()
+    }
+    assert library(NATIVE).sources[0] == library(NATIVE3).sources[0] == "shared_hovercraft/shared.c"
+    assert {f"shared_hovercraft/{name}" for name in ("shared.c", "kernel.c", "variables.h")} <= shared["2"].keys()
     assert shared["2"] == shared["3"]
 
 
@@ -70,9 +74,9 @@ def test_both_flavours_share_a_unit_that_is_compiled_once() -> None:
 def test_the_command_ends_well_where_it_compiled(
     monkeypatch: pytest.MonkeyPatch, reason: str, status: int | str
 ) -> None:
-    monkeypatch.setattr(machine_code, "compile_all", lambda: reason)
+    monkeypatch.setattr(machine_code, "compile_all", lambda *_: reason)
     with pytest.raises(SystemExit) as ended:
-        runpy.run_module("hovercraft_fmu.fmu", run_name="__main__")
+        runpy.run_module("hovercraft_fmu.libraries", run_name="__main__")
     assert ended.value.code == status
 
 
@@ -95,7 +99,7 @@ def test_a_compiler_that_is_left_out_or_another(
     stale = nothing_compiled / "HovercraftNative-0" / "x86_64-linux" / "HovercraftNative.so"
     stale.parent.mkdir(parents=True)
     stale.write_bytes(b"of other C")
-    assert says.partition(";")[0] in compile_all()
+    assert says.partition(";")[0] in compile_libraries()
     done = CliRunner().invoke(cli.commands, ["build", "native", "python", "--output", str(tmp_path / "out")])
     assert done.exit_code == 1
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["Hovercraft.fmu"]

@@ -21,6 +21,7 @@ from tests.native import C_TESTS, SCENES_AND_METHODS, STEPS, Kernel, Text, compi
 from tests.strategies import calm_crafts, controls, crafts, numbers, states
 
 KERNEL, TRIG, LOGARITHM = (c_file(f"{name}.c") for name in ("kernel", "trig", "logarithm"))
+ROUNDING = C_TESTS / "rounding_of.c"
 SHARED = ("-shared", "-fPIC", "-lm")
 METHODS = {method.name: method for method in INTEGRATORS}
 
@@ -29,7 +30,7 @@ METHODS = {method.name: method for method in INTEGRATORS}
 def libm(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
     """With this platform's sine and cosine, which are Python's."""
     folder = tmp_path_factory.mktemp("libm")
-    return Kernel(compile_c(folder / "kernel.so", [KERNEL], "-DHOVERCRAFT_LIBM", *SHARED))
+    return Kernel(compile_c(folder / "kernel.so", [KERNEL, ROUNDING], "-DHOVERCRAFT_LIBM", *SHARED))
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,9 @@ def shipped(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
     """With those of the FMU."""
     return Kernel(
         compile_c(
-            tmp_path_factory.mktemp("shipped") / "kernel.so", [KERNEL, TRIG, LOGARITHM, C_TESTS / "trig_of.c"], *SHARED
+            tmp_path_factory.mktemp("shipped") / "kernel.so",
+            [KERNEL, TRIG, LOGARITHM, ROUNDING, C_TESTS / "trig_of.c"],
+            *SHARED,
         )
     )
 

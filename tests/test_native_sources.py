@@ -8,6 +8,7 @@ import subprocess
 import sys
 import zipfile
 from ctypes import CDLL, c_double
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from hovercraft_fmu.fmu import machine_code, native_header
+from hovercraft_fmu.fmu import craft_native, machine_code
 from hovercraft_fmu.fmu.block import Block
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
-from hovercraft_fmu.fmu.interface import BY_NAME, VARIABLES
+from hovercraft_fmu.fmu.interface import BY_NAME, HOVERCRAFT, VARIABLES
 from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.fmu.variable import Variable
@@ -227,9 +228,9 @@ def test_a_real_added_to_the_table_alone_does_not_compile(tmp_path: Path, monkey
     """Its partial derivatives would be wrong."""
     extra = Variable(len(VARIABLES), "ballast", "parameter", "fixed", "kg", 1.0, "planted")
     starts = machine_code.block_of(NATIVE, "0" * 32).starts
-    monkeypatch.setattr(native_header, "VARIABLES", (*VARIABLES, extra))
+    monkeypatch.setattr(craft_native, "VARIABLES", (*VARIABLES, extra))
     monkeypatch.setattr(machine_code, "block_of", lambda _, build: Block("0" * 32, build, (*starts, 1.0)))
-    written_sources(tmp_path)
+    written_sources(tmp_path, replace(NATIVE, model=replace(HOVERCRAFT, variables=(*VARIABLES, extra))))
     command = [c_compiler(), "-I.", "-c", NATIVE.unit]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode != 0

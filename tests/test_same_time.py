@@ -18,7 +18,7 @@ from hovercraft_fmu.model.subcycling import meant_step, rounding, substeps
 from hovercraft_fmu.scenes import Signals, signals
 from hovercraft_fmu.simulation import Result, plan, run_fmu, run_model
 from hovercraft_fmu.sweeps import load, sweep
-from tests.native import Kernel, compile_c
+from tests.native import C_TESTS, Kernel, compile_c
 from tests.strategies import numbers
 
 Host: TypeAlias = Callable[[float, float, int], float]
@@ -29,7 +29,9 @@ Host: TypeAlias = Callable[[float, float, int], float]
 def kernel(tmp_path_factory: pytest.TempPathFactory) -> Kernel:
     """In C."""
     made = tmp_path_factory.mktemp("same_time") / "kernel.so"
-    return Kernel(compile_c(made, [c_file("kernel.c")], "-DHOVERCRAFT_LIBM", "-shared", "-fPIC", "-lm"))
+    return Kernel(
+        compile_c(made, [c_file("kernel.c"), C_TESTS / "rounding_of.c"], "-DHOVERCRAFT_LIBM", "-shared", "-fPIC", "-lm")
+    )
 
 
 def _product(start: float, step: float, n: int) -> float:

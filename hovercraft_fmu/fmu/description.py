@@ -9,7 +9,9 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from .._version import RELEASE_DATE, __version__
 from ..model.error_estimate import OFF
 from .block import guid
+from .craft_native import CRAFT_NATIVE
 from .interface import CRAFT_PARAMETERS, DERIVATIVES, EXTERNAL, HOVERCRAFT, INPUTS, STATES, TIME
+from .native_header import Native
 from .variable import Kind, Model, Variable
 
 AUTHOR = "The hovercraft-fmu authors"
@@ -46,25 +48,20 @@ CAPABILITIES_3 = {
 """Of FMI 3.0, whatever the interface. Early return and clocks: nothing that could check them."""
 STEPS_ALONE = (("skirt_friction", 0.0), ("error_estimate", OFF))
 """What co-simulation alone offers, and its value that is off."""
-PARTS = (
+ROOM_PARTS = (
     "exchange.c",
     "instance.c",
-    "kernel.c",
-    "linearization.c",
-    "logarithm.c",
     "memory.c",
     "messages.c",
-    "partials.c",
     "permits.c",
     "rates.c",
     "serialize.c",
     "step.c",
     "text.c",
-    "trig.c",
     "variables.c",
     "variant.c",
 )
-"""Whatever the standard."""
+"""The C of every native FMU, beside the face of its standard."""
 LOG_CATEGORIES = {
     "logStatusWarning": "What the run survives but its user should know",
     "logStatusDiscard": "A call that was refused, where other values, another step or another state can be tried",
@@ -91,12 +88,17 @@ class Flavour:
     categories: Mapping[str, str]
     exchange: Mapping[str, str] = field(default_factory=dict)
     """The capabilities in model exchange; none where there is no such interface."""
-    parts: tuple[str, ...] = ()
-    """Files of C in sources/, which `unit` includes."""
+    native: Native | None = None
+    """Its C; None: it is not machine code."""
     fmi: Literal[2, 3] = 2
     """The version of the standard."""
     variant_of: "Flavour | None" = None
     """Whose code it has, with start values of its own."""
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Files of C in sources/, which `unit` includes; the face first. None where there is no C."""
+        return (f"fmi{self.fmi}.c", *sorted((*ROOM_PARTS, *self.native.parts))) if self.native else ()
 
     @property
     def unit(self) -> str:
@@ -150,7 +152,7 @@ NATIVE = Flavour(
     ),
     exchange=MappingProxyType({**COMMON_CAPABILITIES, **NATIVE_CAPABILITIES}),
     categories=MappingProxyType(LOG_CATEGORIES),
-    parts=("fmi2.c", *PARTS),
+    native=CRAFT_NATIVE,
 )
 NATIVE3 = Flavour(
     model=HOVERCRAFT,
@@ -169,7 +171,7 @@ NATIVE3 = Flavour(
     ),
     exchange=MappingProxyType({"needsCompletedIntegratorStep": "true", **CAPABILITIES_3}),
     categories=MappingProxyType(LOG_CATEGORIES),
-    parts=("fmi3.c", *PARTS),
+    native=CRAFT_NATIVE,
     fmi=3,
 )
 

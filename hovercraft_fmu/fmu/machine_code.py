@@ -7,6 +7,7 @@ of, so C that was changed since finds no folder, and stale machine code is never
 """
 
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Container, Iterable, Mapping, Sequence
@@ -19,16 +20,16 @@ from pathlib import Path
 from ..whole import temporary_folder
 from .archive import digest, write_archive
 from .block import Block, block
-from .description import NATIVE, NATIVE3, PARTS, Flavour, model_description, xml
-from .native_header import variables_header
+from .description import Flavour, model_description, xml
+from .native_header import Native, variables_header
 
 COMPILER = ("ziglang", "0.17.1")
 """The package that brings the C compiler; it makes the bytes, so the version is fixed."""
 LEAVE_OUT = "HOVERCRAFT_FMU_NO_COMPILER"
 """The environment variable that keeps the build hook from asking for the compiler."""
 C_FOLDER = Path(__file__).parent / "native"
-ROOM, ARITHMETIC = "room", "arithmetic"
-"""Folders there: what every native FMU needs, and functions that models share. Each model has one of its own."""
+FLEET = "fleet"
+"""The folder there of many craft at once, which is no FMU."""
 COMPILED = Path(__file__).parent / "compiled"
 WHY_NOT = "why_not.txt"
 """In COMPILED: why the last attempt failed, for those who did not see it."""
@@ -123,16 +124,13 @@ class Library:
         return self.folder / platform / f"{self.name}{TARGETS[platform].suffix}"
 
 
-def libraries() -> list[Library]:
-    """All that are compiled."""
-    return [library(NATIVE), library(NATIVE3), fleet_library()]
-
-
 def library(flavour: Flavour) -> Library:
     """Of a native FMU."""
     own = {**sources(identity(flavour), flavour), **headers(flavour)}
+    shared = sources("0" * 32, flavour)
+    del shared[flavour.parts[0]], shared[flavour.unit]
     files = {
-        **{f"{SHARED}/{name}": content for name, content in sources("0" * 32).items()},
+        **{f"{_shared(flavour)}/{name}": content for name, content in shared.items()},
         **{f"{flavour.identifier}/{name}": content for name, content in own.items()},
         **_units(flavour),
     }
@@ -140,23 +138,30 @@ def library(flavour: Flavour) -> Library:
     return Library(flavour.identifier, tuple(_units(flavour)), files, targets)
 
 
-SHARED = "shared"
-"""The folder of what both flavours have to the letter: the second time it is in the compiler's cache."""
+def _native(flavour: Flavour) -> Native:
+    assert flavour.native, f"{flavour.identifier} is no native FMU"
+    return flavour.native
+
+
+def _shared(flavour: Flavour) -> str:
+    """The folder of what both standards have to the letter: the second time it is in the compiler's cache."""
+    return f"shared_{_native(flavour).folder}"
 
 
 def _units(flavour: Flavour) -> dict[str, bytes]:
-    """What a library is compiled of, by path: what both flavours share, and what they do not."""
-    shared, own = [name for name in PARTS if name != "variant.c"], [flavour.parts[0], "variant.c"]
+    """What a library is compiled of, by path: what both standards share, and what they do not."""
+    own = [flavour.parts[0], "variant.c"]
+    shared = [name for name in flavour.parts if name not in own]
     return {
-        f"{SHARED}/shared.c": (KERNEL_IN_LINE + _includes(shared)).encode(),
+        f"{_shared(flavour)}/shared.c": (IN_LINE.format(_native(flavour).folder) + _includes(shared)).encode(),
         f"{flavour.identifier}/library.c": _includes(own).encode(),
     }
 
 
-KERNEL_IN_LINE = """\
+IN_LINE = """\
 /* What nobody else can call a compiler puts into the call of a step, which is a tenth faster for it. */
 #define HIDDEN static
-#include "kernel.h"
+#include "{}.h"
 #undef HIDDEN
 
 """
@@ -184,34 +189,50 @@ UNIT = """\
 
 def fleet_library() -> Library:
     """Of many craft at once: host/fleet.py loads it."""
-    names = [f"{name}.{suffix}" for name in ("kernel", "logarithm", "memory", "trig") for suffix in "ch"]
-    names += [f"{name}.h" for name in ("environment", "hidden", "root")]
-    kernel = [c_file(name) for name in names]
-    files = {f"fleet/{file.name}": file.read_bytes() for file in (*kernel, *sorted((C_FOLDER / "fleet").iterdir()))}
+    own = {file.name: file.read_bytes() for file in sorted((C_FOLDER / FLEET).iterdir())}
+    shared = _with_included(("kernel.c", "logarithm.c", "memory.c", "trig.c", "environment.h"))
+    files = {f"{FLEET}/{name}": content for name, content in {**shared, **own}.items()}
     return Library("HovercraftFleet", ("fleet/fleet.c", "fleet/memory.c"), files)
 
 
-def sources(build: str, flavour: Flavour = NATIVE) -> dict[str, bytes]:
+def sources(build: str, flavour: Flavour) -> dict[str, bytes]:
     """The C of an FMU, by name, without the standard's headers; `build` is a hexadecimal digest of 32 digits."""
-    files = [c_file(name) for name in flavour.parts]
-    files += [file for folder in c_folders() for file in sorted(folder.glob("*.h"))]
     unit = UNIT.format(fmi=flavour.fmi, identifier=flavour.identifier, includes=_includes(flavour.parts))
-    return {
-        **{file.name: file.read_bytes() for file in files},
-        "variables.h": variables_header(block_of(flavour, build)).encode(),
-        flavour.unit: unit.encode(),
-    }
+    header = variables_header(flavour.model, _native(flavour), block_of(flavour, build))
+    files = _with_included((*flavour.parts, f"{_native(flavour).folder}.h"))
+    return {**files, "variables.h": header.encode(), flavour.unit: unit.encode()}
+
+
+def _with_included(names: Iterable[str]) -> dict[str, bytes]:
+    """Files of C and all of this package's that they include, by name."""
+    found: dict[str, bytes] = {}
+    wanted = [*names]
+    while wanted:
+        name = wanted.pop()
+        if name not in found and (path := _found(name)):
+            found[name] = path.read_bytes()
+            wanted += re.findall(r'^#include "(.+)"$', found[name].decode(), re.MULTILINE)
+    return dict(sorted(found.items()))
 
 
 def c_folders() -> list[Path]:
-    """Where the C of the hovercraft's FMUs is."""
-    return [C_FOLDER / name for name in (ROOM, ARITHMETIC, "hovercraft")]
+    """Where the C of native FMUs is: the room (model.h there), what models share, the models."""
+    return sorted(path for path in C_FOLDER.iterdir() if path.name not in (FLEET, "fmi2", "fmi3"))
 
 
 def c_file(name: str) -> Path:
-    """A file of C, wherever it is: each name is there once."""
-    (path,) = (folder / name for folder in c_folders() if (folder / name).exists())
+    """A file of C, wherever it is. Raises FileNotFoundError."""
+    path = _found(name)
+    if path is None:
+        raise FileNotFoundError(f"{C_FOLDER}: no {name} in it")
     return path
+
+
+def _found(name: str) -> Path | None:
+    """Each name is there once."""
+    paths = [folder / name for folder in c_folders() if (folder / name).exists()]
+    assert len(paths) <= 1, f"{name} is there more than once: {paths}"
+    return paths[0] if paths else None
 
 
 def headers(flavour: Flavour) -> dict[str, bytes]:
@@ -258,16 +279,16 @@ def why_not() -> str:
 # ---- compiling
 
 
-def compile_all(platforms: Iterable[str] | None = None) -> str:
+def compile_all(wanted: Sequence[Library], platforms: Iterable[str] | None = None) -> str:
     """Compile what is not compiled yet, and then forget what is stale; where that fails, all stays.
 
     Args:
+        wanted: all that there is to be; see libraries.py.
         platforms: keys of TARGETS; without them all.
 
     Returns:
         Why that failed; '' where it did not.
     """
-    wanted = libraries()
     COMPILED.mkdir(exist_ok=True)
     try:
         _compile(wanted, TARGETS if platforms is None else tuple(platforms))
@@ -288,7 +309,7 @@ def _forget(keep: set[Path]) -> None:
 
 
 def _compile(wanted: Sequence[Library], platforms: Container[str]) -> None:
-    """All libraries and platforms side by side; each file is written at once or not at all."""
+    """All of them and all platforms side by side; each file is written at once or not at all."""
     jobs = [(each, target) for each in wanted for target in each.targets if target in platforms]
     jobs = [(each, target) for each, target in jobs if not each.file(target).exists()]
     if not jobs:

@@ -58,7 +58,7 @@ class Loops:
         name = compiler()
         if name is None:
             raise OSError(f"no C compiler ({', '.join(COMPILERS)})")
-        for file, content in {**sources("0" * 32), **headers(NATIVE)}.items():
+        for file, content in {**sources("0" * 32, NATIVE), **headers(NATIVE)}.items():
             (folder / file).write_bytes(content)
         path = folder / "step_costs.so"
         command = [name, *OPTIONS, "-I", str(folder), str(SOURCE), "-o", str(path), "-lm"]

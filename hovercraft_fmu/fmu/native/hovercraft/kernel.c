@@ -11,7 +11,6 @@ static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
 static const double NEAR_REST = 4.0;      /* sub-steps in which friction could stop the craft */
 static const double MOST = 1e100;         /* h times a rate of drag is taken as no more by splitting */
 static const double LEAST_SLIP = 1e-150;  /* m/s: so that at rest nothing is divided by zero */
-static const double UNIT = 0x1p-52;       /* relative: one or two units in the last place of a double */
 static const double LARGEST = 1e300;      /* m, rad: the estimate of an error where there is none */
 static const double TIGHTER = 32.0;       /* the adaptive companion's tolerance is smaller by this */
 static const double NOT_SMALL = 0.25;     /* of the way: an error above it is lost */
@@ -45,12 +44,6 @@ static double natural_logarithm(double x)
 }
 
 #endif
-
-/* Python's min(a, b). */
-static inline double smaller(double a, double b)
-{
-    return b < a ? b : a;
-}
 
 /* ---- craft.py */
 
@@ -943,11 +936,6 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
 
 /* ---- subcycling.py */
 
-double kernel_rounding(double largest, double step, double steps)
-{
-    return smaller((4.0 + steps) * UNIT * largest, 0.1 * step);
-}
-
 /* To the nearest, of what is below 2^51. */
 static double whole_number(double ratio)
 {
@@ -961,7 +949,7 @@ double kernel_meant_step(double time, double step, double start_time, double ste
         return step;
     const double whole = whole_number(ratio) * step_size;
     const double largest = larger(larger(fabs(time), fabs(time + step)), fabs(start_time));
-    return fabs(whole - step) <= kernel_rounding(largest, step, 0.0) ? whole : step;
+    return fabs(whole - step) <= time_rounding(largest, step, 0.0) ? whole : step;
 }
 
 /* Number and size [s] of the sub-steps of a communication step; false where they are too many. */
@@ -971,7 +959,7 @@ static bool substeps(double communication_step, double step_size, int64_t *n, do
     if (!(ratio <= MAX_SUBSTEPS + 1.0))
         return false;
     double whole = whole_number(ratio);
-    const double rounding = kernel_rounding(communication_step, communication_step, 0.0);
+    const double rounding = time_rounding(communication_step, communication_step, 0.0);
     if (fabs(whole * step_size - communication_step) <= rounding) {
         *h = step_size;
     } else {

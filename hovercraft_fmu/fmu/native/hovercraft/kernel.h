@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "hidden.h"
+#include "rounding.h"
 
 enum drag_area { CONSTANT = 1, DIRECTIONAL };
 
@@ -108,12 +109,6 @@ struct stretch {
 /* Why a stretch was not made; its `state` then tells what came out, where something did. */
 enum outcome { ADVANCED, TOO_MANY_SUBSTEPS, NOT_FINITE, STEP_TOO_SMALL };
 
-/* Python's max(a, b): the first, unless the second is beyond it; so NaN in b changes nothing. */
-static inline double larger(double a, double b)
-{
-    return b > a ? b : a;
-}
-
 /* m: the mean distance of the points of the skirt's rectangle from its centre, diagonal/6 + (along + across)/12. */
 struct friction_radius {
     double radius, diagonal, along, across;
@@ -131,8 +126,6 @@ HIDDEN struct loads kernel_loads_on(const struct state *state, const struct cont
 /* Surge and sway [m/s]. */
 HIDDEN void kernel_body_velocity(const struct state *state, double *surge, double *sway);
 
-/* s: what two times that mean the same may differ by; see subcycling.py. */
-HIDDEN double kernel_rounding(double largest, double step, double steps);
 /* s: the whole number of sub-steps that a communication step means, or else the communication step itself. */
 HIDDEN double kernel_meant_step(double time, double step, double start_time, double step_size);
 

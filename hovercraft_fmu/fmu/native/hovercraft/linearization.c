@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "partials.h"
 #include "root.h"
 #include "trig.h"
 

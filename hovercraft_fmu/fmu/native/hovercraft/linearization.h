@@ -4,12 +4,9 @@
 #define HOVERCRAFT_LINEARIZATION_H
 
 #include "hidden.h"
-#include "variables.h"
+#include "kernel.h"
 
-/* d(ROWS)/d(KNOWNS). */
-struct linearization {
-    double of[ROW_COUNT][INITIAL_KNOWN_COUNT];
-};
+struct linearization; /* partials.h */
 
 /* At a state and controls, these before saturation; without `parameters` only the first KNOWN_COUNT columns, and no
    projected area. The equations have kinks. There the slope is that of the inside for an input at its limit, and so 0

@@ -1,7 +1,7 @@
 #include "instance.h"
+#include "rounding.h"
 
 #include <math.h>
-#include <string.h>
 
 /* ---- phases */
 
@@ -24,7 +24,7 @@ enum verdict instance_update_discrete_states(struct instance *instance)
 {
     if (instance_take_up(instance) == REFUSED)
         return REFUSED;
-    return instance_warn_of_held_inputs(instance, &instance->now.controls);
+    return model()->warn(instance);
 }
 
 /* A solver may look ahead of the stop time, and comes back from there; a step that it has completed stands. */
@@ -33,13 +33,13 @@ enum verdict instance_complete_integrator_step(struct instance *instance, bool *
     const double time = instance->now.time, stop_time = instance->now.stop_time;
     const double start_time = instance->now.start_time, step = time - instance->now.completed;
     const double largest = larger(fabs(time), fabs(start_time));
-    if (step > 0.0 && time - stop_time > kernel_rounding(largest, step, (time - start_time) / step))
+    if (step > 0.0 && time - stop_time > time_rounding(largest, step, (time - start_time) / step))
         return instance_say(instance, REFUSED, "%s at %r s: must not lead past stopTime = %r s",
                             call_name(instance, COMPLETE_INTEGRATOR_STEP), time, stop_time);
     if (instance_take_up(instance) == REFUSED)
         return REFUSED;
     instance->now.completed = time;
-    *event_needed = instance_has_to_warn(instance);
+    *event_needed = model()->has_to_warn(instance);
     return FINE;
 }
 
@@ -50,7 +50,7 @@ enum verdict instance_set_time(struct instance *instance, double time)
     const double start_time = instance->now.start_time;
     if (!isfinite(time))
         return instance_say(instance, REFUSED, "time = %r s: must be a finite number", time);
-    if (start_time - time > kernel_rounding(fabs(start_time), INFINITY, 0.0))
+    if (start_time - time > time_rounding(fabs(start_time), INFINITY, 0.0))
         return instance_say(instance, REFUSED, "time = %r s: must not be before startTime = %r s", time, start_time);
     instance->now.time = time;
     return FINE;
@@ -73,8 +73,9 @@ enum verdict instance_set_states(struct instance *instance, const double *values
         if (!isfinite(values[i]))
             return instance_say(instance, DISCARDED, "%s = %r: must be a finite number", VARIABLES[STATES[i]].name,
                                 values[i]);
-    memcpy(&now->state, values, sizeof now->state);
-    now->motion_unread = now->action_unread = true;
+    for (unsigned i = 0; i < STATE_COUNT; i++)
+        states_of(now)[i] = values[i];
+    now->unread = now->unread_on_demand = true;
     return FINE;
 }
 

@@ -11,7 +11,7 @@
 #include "variant.h"
 
 #ifdef __GNUC__
-#pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard's functions have some that a craft does not need */
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard's functions have some that nobody needs here */
 #endif
 
 struct component {
@@ -71,7 +71,10 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 
 static bool is_acceptable(struct instance *instance, fmi2Type type, fmi2String guid)
 {
-    if (type != fmi2CoSimulation && type != fmi2ModelExchange)
+    if (type == fmi2ModelExchange && !model()->follow)
+        instance_say(instance, REFUSED, "fmuType = %i: must be fmi2CoSimulation, %i: there is no ModelExchange in "
+                     "modelDescription.xml", (long long)type, (long long)fmi2CoSimulation);
+    else if (type != fmi2CoSimulation && type != fmi2ModelExchange)
         instance_say(instance, REFUSED, "fmuType = %i: must be fmi2ModelExchange, %i, or fmi2CoSimulation, %i",
                      (long long)type, (long long)fmi2ModelExchange, (long long)fmi2CoSimulation);
     else if (!guid || strcmp(guid, variant()->guid) != 0)
@@ -148,15 +151,25 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[])
 {
-    return STATUS_OF(GET_INTEGERS, n == 0 || (vr && value), instance_get_integers(c, vr, n, value));
+    return STATUS_OF(GET_INTEGERS, n == 0 || (vr && value), instance_get_integers(c, INTEGER, vr, n, value));
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[])
 {
-    return STATUS_OF(SET_INTEGERS, n == 0 || (vr && value), instance_set_integers(c, vr, n, value));
+    return STATUS_OF(SET_INTEGERS, n == 0 || (vr && value), instance_set_integers(c, INTEGER, vr, n, value));
 }
 
-/* There are none of these types: an empty list is fine. */
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[])
+{
+    return STATUS_OF(GET_BOOLEANS, n == 0 || (vr && value), instance_get_integers(c, BOOLEAN, vr, n, value));
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[])
+{
+    return STATUS_OF(SET_BOOLEANS, n == 0 || (vr && value), instance_set_integers(c, BOOLEAN, vr, n, value));
+}
+
+/* There are none of this type: an empty list is fine. */
 #define NONE_OF(Type)                                                                                                  \
     fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2##Type value[])             \
     {                                                                                                                  \
@@ -167,7 +180,6 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
         return status_of(instance_none_of(c, "fmi2Set" #Type, #Type, vr, n));                                         \
     }
 
-NONE_OF(Boolean)
 NONE_OF(String)
 
 /* ---- FMU state */
@@ -211,7 +223,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 {
     const bool given = (n_unknown == 0 || (unknown && d_unknown)) && (n_known == 0 || (known && d_known));
     return STATUS_OF(DIRECTIONAL_DERIVATIVE, given,
-                     instance_directional_derivatives(c, unknown, n_unknown, known, n_known, d_known, d_unknown));
+                     model()->directional(c, unknown, n_unknown, known, n_known, d_known, d_unknown));
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
@@ -345,7 +357,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
         return fmi2Error;
     if (kind != fmi2Terminated)
         return fmi2Discard;
-    *value = fmi2False; /* the craft never ends a run */
+    *value = fmi2False; /* no model ends a run */
     return fmi2OK;
 }
 

@@ -11,7 +11,7 @@
 #include "variant.h"
 
 #ifdef __GNUC__
-#pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard's functions have some that a craft does not need */
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard's functions have some that nobody needs here */
 #endif
 
 struct component {
@@ -116,12 +116,15 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     if (event_mode_used)
         refuse(&c->instance, call, "eventModeUsed must be false: hasEventMode is false");
     for (size_t i = 0; i < n_intermediate && !refused; i++) {
-        refused = !intermediate || instance_place(INPUTS, INPUT_COUNT, intermediate[i]) == INPUT_COUNT;
+        refused = !model()->asks || !intermediate || instance_place(INPUTS, INPUT_COUNT, intermediate[i]) == INPUT_COUNT;
         if (refused)
-            refuse(&c->instance, call, "requiredIntermediateVariables must be inputs: no other has intermediateUpdate");
+            refuse(&c->instance, call, model()->asks ? "requiredIntermediateVariables must be inputs: no other has "
+                                                       "intermediateUpdate"
+                                                     : "requiredIntermediateVariables must be none: no variable has "
+                                                       "intermediateUpdate");
     }
     c->update = update;
-    c->instance.services.ask = update ? ask : NULL;
+    c->instance.services.ask = update && model()->asks ? ask : NULL;
     if (!refused)
         return c;
     memory_release(c);
@@ -132,7 +135,12 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3Boolean logging, fmi3InstanceEnvironment environment,
                                           fmi3LogMessageCallback log)
 {
-    return made(MODEL_EXCHANGE, token, logging, environment, log);
+    struct component *c = made(model()->follow ? MODEL_EXCHANGE : CO_SIMULATION, token, logging, environment, log);
+    if (!c || model()->follow)
+        return c;
+    refuse(&c->instance, "fmi3InstantiateModelExchange", "there is no ModelExchange in modelDescription.xml");
+    memory_release(c);
+    return NULL;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
@@ -193,7 +201,8 @@ static bool is_list(struct instance *instance, const char *name, size_t n, size_
 static bool is_list_of(struct instance *instance, enum call call, enum kind kind, const fmi3ValueReference vr[],
                        size_t n, size_t n_values)
 {
-    static const char *const names[] = {[REAL] = "Float64", [INTEGER] = "Int32", [ENUMERATION] = "Enumeration"};
+    static const char *const names[] = {
+        [REAL] = "Float64", [INTEGER] = "Int32", [ENUMERATION] = "Enumeration", [BOOLEAN] = "Boolean"};
     if (!is_list(instance, call_name(instance, call), n, n_values))
         return false;
     for (size_t i = 0; i < n; i++) {
@@ -245,13 +254,13 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
 
 fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Int32 values[], size_t n_values)
 {
-    return STATUS_OF_LIST(GET_INTEGERS, INTEGER, instance_get_integers(c, vr, n, values));
+    return STATUS_OF_LIST(GET_INTEGERS, INTEGER, instance_get_integers(c, INTEGER, vr, n, values));
 }
 
 fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 values[],
                         size_t n_values)
 {
-    return STATUS_OF_LIST(SET_INTEGERS, INTEGER, instance_set_integers(c, vr, n, values));
+    return STATUS_OF_LIST(SET_INTEGERS, INTEGER, instance_set_integers(c, INTEGER, vr, n, values));
 }
 
 /* Of enumerations, which have no functions of their own. */
@@ -264,6 +273,18 @@ fmi3Status fmi3SetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                         size_t n_values)
 {
     return STATUS_OF_LIST(SET_ENUMERATIONS, ENUMERATION, instance_set_enumerations(c, vr, n, values));
+}
+
+fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Boolean values[],
+                          size_t n_values)
+{
+    return STATUS_OF_LIST(GET_BOOLEANS, BOOLEAN, instance_get_booleans(c, vr, n, values));
+}
+
+fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Boolean values[],
+                          size_t n_values)
+{
+    return STATUS_OF_LIST(SET_BOOLEANS, BOOLEAN, instance_set_booleans(c, vr, n, values));
 }
 
 /* There are no variables of these types: an empty list is fine. */
@@ -294,7 +315,6 @@ NONE_OF(Int16)
 NONE_OF(UInt16)
 NONE_OF(UInt32)
 NONE_OF(UInt64)
-NONE_OF(Boolean)
 NONE_OF(String)
 
 fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n, size_t sizes[], fmi3Binary values[],
@@ -532,7 +552,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
     if (!permitted(c, DIRECTIONAL_DERIVATIVE, given) ||
         !is_seeded(c, DIRECTIONAL_DERIVATIVE, n_seed, n_knowns, n_sensitivity, n_unknowns))
         return fmi3Error;
-    return MADE(instance_directional_derivatives(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
+    return MADE(model()->directional(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t n_unknowns,
@@ -543,5 +563,5 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
     if (!permitted(c, ADJOINT_DERIVATIVE, given) ||
         !is_seeded(c, ADJOINT_DERIVATIVE, n_seed, n_unknowns, n_sensitivity, n_knowns))
         return fmi3Error;
-    return MADE(instance_adjoint_derivatives(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
+    return MADE(model()->adjoint(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
 }

@@ -16,8 +16,8 @@ enum verdict instance_reset(struct instance *instance)
         .use = instance->now.use,
         .phase = INSTANTIATED,
         .stop_time = INFINITY,
-        .motion_unread = true,
-        .action_unread = true,
+        .unread = true,
+        .unread_on_demand = true,
     };
     instance->now = empty;
     instance->last_step = FINE;
@@ -31,6 +31,8 @@ enum verdict instance_reset(struct instance *instance)
         else
             instance->now.integers[i] = (int32_t)variant()->starts[i];
     }
+    instance_copy(instance->now.inputs, instance->now.reals, INPUTS, INPUT_COUNT);
+    instance_copy(states_of(&instance->now), instance->now.reals, STATES, STATE_COUNT);
     return FINE;
 }
 
@@ -87,21 +89,7 @@ void instance_spread(double *reals, const void *from, const unsigned *references
         memcpy(&reals[references[i]], (const char *)from + i * sizeof(double), sizeof(double));
 }
 
-static enum verdict check_derived(struct instance *instance, const struct craft *craft)
-{
-    const struct derived derived = kernel_derived(craft);
-    for (unsigned i = 0; i < sizeof DERIVED / sizeof *DERIVED; i++) {
-        const struct derived_value *value = &DERIVED[i];
-        const double found = *(const double *)(const void *)((const char *)&derived + value->offset);
-        if (!isfinite(found))
-            return instance_say(instance, DISCARDED, "%s = %r %s: must be a finite number; it is made of %s", value->name,
-                                found, value->unit, value->parts);
-    }
-    return FINE;
-}
-
-/* What an enumeration and the integer beside it say together. Refused: both are set, and differ. */
-static enum verdict choose(struct instance *instance, unsigned enumeration, int32_t *item)
+enum verdict instance_choose(struct instance *instance, unsigned enumeration, int32_t *item)
 {
     const int32_t *integers = instance->now.integers;
     unsigned i = 0;
@@ -116,61 +104,26 @@ static enum verdict choose(struct instance *instance, unsigned enumeration, int3
     return FINE;
 }
 
-enum verdict instance_make_craft(struct instance *instance, struct craft *craft)
-{
-    const struct content *now = &instance->now;
-    for (unsigned i = 0; i < CRAFT_COUNT; i++) {
-        const unsigned reference = CRAFT_FIELDS[i].reference;
-        char *field = (char *)craft + CRAFT_FIELDS[i].offset;
-        if (VARIABLES[reference].kind == REAL)
-            *(double *)(void *)field = now->reals[reference];
-        else if (choose(instance, reference, (int32_t *)(void *)field) == REFUSED)
-            return REFUSED;
-    }
-    if (craft->thrust_max - craft->thrust_min < 0.0)
-        return instance_say(instance, DISCARDED, "thrust_min = %r N: must not be above thrust_max = %r N",
-                            craft->thrust_min, craft->thrust_max);
-    return check_derived(instance, craft);
-}
-
 static enum verdict take_up_start_values(struct instance *instance)
 {
     struct content *now = &instance->now;
-    struct craft craft;
-    int32_t integrator, error_estimate;
-    if (instance_make_craft(instance, &craft) == REFUSED || choose(instance, V_INTEGRATOR, &integrator) == REFUSED ||
-        choose(instance, V_ERROR_ESTIMATE, &error_estimate) == REFUSED)
+    if (model()->take_up(instance) == REFUSED)
         return REFUSED;
-    now->craft = craft;
-    now->settings = (struct settings){
-        .step_size = now->reals[V_STEP_SIZE],
-        .integrator = integrator,
-        .tolerance = now->hosts_tolerance > 0.0 ? now->hosts_tolerance : now->reals[V_TOLERANCE],
-    };
-    instance_copy(&now->inputs, now->reals, INPUTS, INPUT_COUNT);
-    instance_copy(&now->state, now->reals, STATES, STATE_COUNT);
-    now->controls = now->inputs;
-    now->estimates = error_estimate == ON;
-    now->companion = (struct companion){.state = now->state};
-    now->reals[V_PROJECTED_AREA] = kernel_derived(&craft).projected_area;
     now->tuned = false;
-    now->motion_unread = now->action_unread = true;
+    now->unread = now->unread_on_demand = true;
     return FINE;
 }
 
 enum verdict instance_take_up(struct instance *instance)
 {
     struct content *now = &instance->now;
-    struct craft craft = now->craft;
     if (!instance_has_started(now))
         return take_up_start_values(instance);
     if (now->use != MODEL_EXCHANGE)
         return FINE;
-    if (now->tuned && instance_make_craft(instance, &craft) == REFUSED)
+    if (model()->follow(instance) == REFUSED)
         return REFUSED;
-    now->craft = craft;
     now->tuned = false;
-    now->controls = now->inputs;
     return FINE;
 }
 

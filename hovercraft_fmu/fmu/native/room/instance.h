@@ -1,6 +1,6 @@
-/* One craft behind an interface for co-simulation or model exchange: variables, life cycle, faults, warnings, state. It
-   knows no standard: a face (fmi2.c, fmi3.c) translates. What it is given it checks, once; a refused call changes
-   nothing. */
+/* One instance of a model behind an interface for co-simulation or model exchange: variables, life cycle, faults,
+   warnings, state. It knows no standard: a face (fmi2.c, fmi3.c) translates; and no physics: that is the model's
+   (model.h). What it is given it checks, once; a refused call changes nothing. */
 
 #ifndef HOVERCRAFT_INSTANCE_H
 #define HOVERCRAFT_INSTANCE_H
@@ -11,7 +11,7 @@
 
 #include "environment.h"
 #include "hidden.h"
-#include "linearization.h"
+#include "model.h"
 #include "permits.h"
 #include "variables.h"
 
@@ -21,11 +21,6 @@
 #else
 #define DOOR HIDDEN
 #endif
-
-/* A refused call changes nothing. It is DISCARDED where the standard has that for the call and other values, another
-   step or another state could be taken; else REFUSED, an error. So it is said, and a face hears of it when it leaves
-   (instance_leave); within the instance both are REFUSED. */
-enum verdict { FINE, WARNED, DISCARDED, REFUSED };
 
 /* What the host takes it for: steps, or equations for a solver of its own. */
 enum use { CO_SIMULATION, MODEL_EXCHANGE };
@@ -50,22 +45,21 @@ struct content {
     double stop_time;                 /* s, given with the experiment; else infinite */
     double reals[VARIABLE_COUNT];     /* what is read, by value reference */
     int32_t integers[VARIABLE_COUNT];
-    struct controls inputs;           /* where the next step begins: as the host set them, and as ramps led on */
+    double inputs[INPUT_COUNT];       /* where the next step begins: as the host set them, and as ramps led on */
     double rates[INPUT_COUNT];        /* per s, of the inputs */
     int32_t rated;                    /* bit i: that of input i was set at this communication point */
     double hosts_tolerance;           /* given with the experiment, it comes before the parameter; else 0 */
-    struct state state;
-    struct controls controls;         /* at the end of the last step, before saturation; in model exchange now */
-    struct craft craft;               /* of the last step; in model exchange now */
-    struct settings settings;
-    double proposed;                  /* s, the next step of the adaptive method */
-    bool estimates;                   /* its own error, by a companion: */
-    struct companion companion;
-    double stability, rotation;       /* 1, rad: the largest of a sub-step so far */
     bool tuned;                       /* a parameter was set since the last step: the next one takes it up */
-    bool motion_unread;               /* the motion in `reals` is not yet that of the communication point */
-    bool action_unread;               /* nor is what acts on the craft */
+    bool unread;                      /* what is read is not yet that of the communication point */
+    bool unread_on_demand;            /* nor is what is worked out on demand */
+    struct model model;
 };
+
+/* Of the model, in the order of STATES. */
+static inline double *states_of(struct content *content)
+{
+    return (double *)(void *)&content->model;
+}
 
 struct instance {
     struct content now;
@@ -134,8 +128,8 @@ DOOR bool instance_has_started(const struct content *content);
 /* The inputs and the parameters as they are now: before the start, and in model exchange; refused where the parameters
    contradict one another. */
 DOOR enum verdict instance_take_up(struct instance *instance);
-/* The craft that the parameters make. */
-DOOR enum verdict instance_make_craft(struct instance *instance, struct craft *craft);
+/* What an enumeration and the integer beside it say together. Refused: both are set, and differ. */
+DOOR enum verdict instance_choose(struct instance *instance, unsigned enumeration, int32_t *item);
 /* From some of the variables to a structure of doubles in their order, and back. */
 DOOR void instance_copy(void *into, const double *reals, const unsigned *references, unsigned n);
 DOOR void instance_spread(double *reals, const void *from, const unsigned *references, unsigned n);
@@ -148,24 +142,35 @@ DOOR enum verdict instance_restore(struct instance *instance, const struct conte
 
 /* ---- step.c */
 DOOR enum verdict instance_step(struct instance *instance, double point, double step);
-/* A word where inputs are out of their limits, and whether it is still to be said of the inputs as they are now. */
-DOOR enum verdict instance_warn_of_held_inputs(struct instance *instance, const struct controls *controls);
-DOOR bool instance_has_to_warn(const struct instance *instance);
-/* By its companion, at the communication point; 0 where it has none. */
-DOOR struct error instance_error(const struct content *content);
+/* For a model's step: let the host set inputs that are to hold at a time [s] of the step; false where it was asked for
+   that before, as the end of a sub-step is the start of the next. And whether a call of its in there was refused. */
+DOOR bool instance_ask(struct instance *instance, struct interval *interval, double time);
+DOOR enum verdict instance_check_asked(struct instance *instance, const struct interval *interval);
+/* Whether this bit of a variable that sums up warnings was not yet set; then it is, now. */
+HIDDEN bool instance_is_first(struct instance *instance, unsigned reference, int bit);
+static inline enum verdict worse(enum verdict a, enum verdict b)
+{
+    return a > b ? a : b;
+}
 
 /* ---- variables.c */
 DOOR enum verdict instance_get_reals(struct instance *instance, const unsigned *references, size_t n, double *values);
-DOOR enum verdict instance_get_integers(struct instance *instance, const unsigned *references, size_t n, int *values);
+/* Booleans, too, as 0 and 1: `kind` is BOOLEAN, or INTEGER for Integers and Enumerations. */
+DOOR enum verdict instance_get_integers(struct instance *instance, enum kind kind, const unsigned *references, size_t n,
+                                        int *values);
 DOOR enum verdict instance_set_reals(struct instance *instance, const unsigned *references, size_t n,
                                      const double *values);
-DOOR enum verdict instance_set_integers(struct instance *instance, const unsigned *references, size_t n,
+DOOR enum verdict instance_set_integers(struct instance *instance, enum kind kind, const unsigned *references, size_t n,
                                         const int *values);
-/* As 64-bit numbers. */
+/* Enumerations as 64-bit numbers. */
 DOOR enum verdict instance_get_enumerations(struct instance *instance, const unsigned *references, size_t n,
                                             int64_t *values);
 DOOR enum verdict instance_set_enumerations(struct instance *instance, const unsigned *references, size_t n,
                                             const int64_t *values);
+/* Booleans as such. */
+DOOR enum verdict instance_get_booleans(struct instance *instance, const unsigned *references, size_t n, bool *values);
+DOOR enum verdict instance_set_booleans(struct instance *instance, const unsigned *references, size_t n,
+                                        const bool *values);
 /* Refused: a start value that a host could not set either. */
 DOOR enum verdict instance_check_start(struct instance *instance, unsigned reference, double value);
 /* A call for a type that has no variables: an empty list is fine. */
@@ -173,13 +178,16 @@ DOOR enum verdict instance_none_of(struct instance *instance, const char *name, 
                                    const unsigned *references, size_t n);
 /* A reference of a type that has no variables. */
 DOOR enum verdict instance_no_such(struct instance *instance, const char *kind, unsigned reference);
+/* Why a value cannot be, by the model or by the rule in the table; NULL where it can. */
+HIDDEN const char *instance_why_not(const struct content *content, const struct variable *variable, double value);
 /* Where a reference is in a list, or its length. */
 HIDDEN unsigned instance_place(const unsigned *references, unsigned n, unsigned reference);
 DOOR enum verdict instance_check_settable(struct instance *instance, const struct variable *variable, double value);
-/* Bring what is read of the motion up to the communication point; then what acts on the craft, which most hosts never
-   ask for. */
-DOOR enum verdict instance_observe_motion(struct instance *instance);
-DOOR enum verdict instance_observe_action(struct instance *instance);
+/* Bring what is read up to the communication point; and, after that, what is worked out on demand. */
+DOOR enum verdict instance_observe(struct instance *instance);
+DOOR enum verdict instance_observe_on_demand(struct instance *instance);
+/* Refused: one of these is no finite number. */
+DOOR enum verdict instance_check_finite(struct instance *instance, const unsigned *references, unsigned n);
 
 /* ---- rates.c: first derivatives, of inputs, from the next communication point on; of outputs, at this one. */
 DOOR enum verdict instance_set_rates(struct instance *instance, const unsigned *references, size_t n, const int *orders,
@@ -202,19 +210,6 @@ DOOR enum verdict instance_get_derivatives(struct instance *instance, double *va
 DOOR enum verdict instance_get_nominals(struct instance *instance, double *values, size_t n);
 /* There are none. */
 DOOR enum verdict instance_get_event_indicators(struct instance *instance, size_t n);
-
-/* ---- partials.c: the partial derivatives, for either use, from initialization mode on, where what is read stands,
-   with the inputs and the parameters that are set: in step mode those of the step to come. In initialization mode of
-   what is calculated then (ROWS), with respect to inputs, states and real parameters; later of outputs and of the
-   states' derivatives, with respect to states and inputs. Refused: an unknown or a known that is none of these, what
-   is no finite number, accelerations of a craft at rest on ground that rubs. A value for each unknown: the sum over
-   the knowns of seed * d(unknown)/d(known); the adjoint ones: for each known, over the unknowns. */
-DOOR enum verdict instance_directional_derivatives(struct instance *instance, const unsigned *unknowns,
-                                                   size_t n_unknowns, const unsigned *knowns, size_t n_knowns,
-                                                   const double *seeds, double *values);
-DOOR enum verdict instance_adjoint_derivatives(struct instance *instance, const unsigned *unknowns, size_t n_unknowns,
-                                               const unsigned *knowns, size_t n_knowns, const double *seeds,
-                                               double *values);
 
 /* ---- serialize.c: the same bytes on every platform. */
 DOOR enum verdict instance_serialized_size(const struct content *content, size_t *size);

@@ -1,9 +1,6 @@
-#include "instance.h"
+#include "partials.h"
 
 #include <math.h>
-
-/* Nothing follows a parameter of the steps at once, and there are two; all else that is given is a known of ROWS. */
-_Static_assert(GIVEN_REAL_COUNT == INITIAL_KNOWN_COUNT + 2, "a parameter is a number of the craft, or of the steps");
 
 /* The standard's knowns: in initialization mode the inputs, and every Real that is given exactly: states, parameters;
    later the inputs and the states, and in FMI 3.0, where they can be set, the tunable parameters. */
@@ -18,10 +15,10 @@ static bool is_known(const struct instance *instance, unsigned reference)
     return place < KNOWN_COUNT || (instance->services.fmi == 3 && VARIABLES[reference].settable >> phase & 1u);
 }
 
-/* What the FMU says of its own error follows nothing at once: every derivative of it is 0. */
-static bool is_error(unsigned reference)
+/* What follows nothing at once: every derivative of it is 0. */
+static bool is_flat(unsigned reference)
 {
-    return instance_place(ERRORS, ERROR_COUNT, reference) < ERROR_COUNT;
+    return instance_place(FLAT, FLAT_COUNT, reference) < FLAT_COUNT;
 }
 
 /* And its unknowns: in initialization mode those that are calculated then; later states and their derivatives, and what
@@ -29,10 +26,10 @@ static bool is_error(unsigned reference)
 static bool is_unknown(enum phase phase, unsigned reference)
 {
     if (phase == INITIALIZING)
-        return instance_place(ROWS, ROW_COUNT, reference) < ROW_COUNT || is_error(reference);
+        return instance_place(ROWS, ROW_COUNT, reference) < ROW_COUNT || is_flat(reference);
     return instance_place(STATES, STATE_COUNT, reference) < STATE_COUNT ||
            instance_place(DERIVATIVES, STATE_COUNT, reference) < STATE_COUNT ||
-           instance_place(MOTION, MOTION_COUNT, reference) < MOTION_COUNT || is_error(reference);
+           instance_place(OUTPUTS, OUTPUT_COUNT, reference) < OUTPUT_COUNT || is_flat(reference);
 }
 
 static enum verdict refuse_reference(struct instance *instance, enum call call, unsigned reference, const char *what,
@@ -63,22 +60,6 @@ static enum verdict check_references(struct instance *instance, enum call call, 
     return FINE;
 }
 
-/* Whether one of them is the derivative of a velocity. */
-static bool is_accelerated(const unsigned *unknowns, size_t n_unknowns)
-{
-    for (size_t i = 0; i < n_unknowns; i++) {
-        const unsigned row = instance_place(ROWS, ROW_COUNT, unknowns[i]);
-        if (row >= ROW_ACCELERATION_X && row <= ROW_ACCELERATION_YAW)
-            return true;
-    }
-    return false;
-}
-
-static bool is_stuck(const struct state *s, const struct craft *craft)
-{
-    return craft->skirt_friction != 0.0 && s->vx == 0.0 && s->vy == 0.0 && s->yaw_rate == 0.0;
-}
-
 /* d(unknown)/d(known), of references that were not refused. */
 static double partial(const struct linearization *linearization, unsigned unknown, unsigned known)
 {
@@ -89,25 +70,17 @@ static double partial(const struct linearization *linearization, unsigned unknow
     return unknown == known ? 1.0 : 0.0; /* of states, or velocities */
 }
 
-static enum verdict linearize(struct instance *instance, enum call call, const unsigned *unknowns, size_t n_unknowns,
-                              const unsigned *knowns, size_t n_knowns, struct linearization *linearization)
+static enum verdict linearized(struct instance *instance, enum call call, const unsigned *unknowns, size_t n_unknowns,
+                            const unsigned *knowns, size_t n_knowns, struct linearization *linearization)
 {
-    const struct content *now = &instance->now;
-    struct craft craft;
     if (check_references(instance, call, unknowns, n_unknowns, knowns, n_knowns) == REFUSED ||
         instance_get_reals(instance, NULL, 0, NULL) == REFUSED) /* all is up to date after that */
         return REFUSED;
-    const bool to_come = now->phase == STEPPING; /* a controller asks at a point what an input would do from there */
-    craft = now->craft;
-    if (to_come && now->tuned && instance_make_craft(instance, &craft) == REFUSED)
-        return REFUSED;
-    if (is_stuck(&now->state, &craft) && is_accelerated(unknowns, n_unknowns))
-        return instance_say(instance, DISCARDED, "%s: the craft is at rest on ground that rubs: it must slide to have "
-                                               "partial derivatives", call_name(instance, call));
-    bool parameters = now->phase == INITIALIZING;
+    bool parameters = instance->now.phase == INITIALIZING;
     for (size_t k = 0; k < n_knowns; k++)
         parameters = parameters || instance_place(KNOWNS, KNOWN_COUNT, knowns[k]) == KNOWN_COUNT;
-    kernel_linearize(&now->state, to_come ? &now->inputs : &now->controls, &craft, parameters, linearization);
+    if (model()->linearize(instance, call, unknowns, n_unknowns, parameters, linearization) == REFUSED)
+        return REFUSED;
     for (size_t i = 0; i < n_unknowns; i++)
         for (size_t k = 0; k < n_knowns; k++) {
             const double value = partial(linearization, unknowns[i], knowns[k]);
@@ -135,7 +108,7 @@ enum verdict instance_directional_derivatives(struct instance *instance, const u
                                               const double *seeds, double *values)
 {
     struct linearization linearization;
-    if (linearize(instance, DIRECTIONAL_DERIVATIVE, unknowns, n_unknowns, knowns, n_knowns, &linearization) == REFUSED)
+    if (linearized(instance, DIRECTIONAL_DERIVATIVE, unknowns, n_unknowns, knowns, n_knowns, &linearization) == REFUSED)
         return REFUSED;
     for (size_t i = 0; i < n_unknowns; i++) {
         const double value = directional(&linearization, unknowns[i], knowns, n_knowns, seeds);
@@ -162,7 +135,7 @@ enum verdict instance_adjoint_derivatives(struct instance *instance, const unsig
                                           const unsigned *knowns, size_t n_knowns, const double *seeds, double *values)
 {
     struct linearization linearization;
-    if (linearize(instance, ADJOINT_DERIVATIVE, unknowns, n_unknowns, knowns, n_knowns, &linearization) == REFUSED)
+    if (linearized(instance, ADJOINT_DERIVATIVE, unknowns, n_unknowns, knowns, n_knowns, &linearization) == REFUSED)
         return REFUSED;
     for (size_t k = 0; k < n_knowns; k++) {
         const double value = adjoint(&linearization, unknowns, n_unknowns, knowns[k], seeds);

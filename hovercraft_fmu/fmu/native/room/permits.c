@@ -34,6 +34,8 @@ static const struct permit PERMITS[CALL_COUNT] = {
                    .discarded = EITHER_USE},
     [GET_INTEGERS] = {.names = {"fmi2GetInteger", "fmi3GetInt32"}, .phases = EVER, .not_in_2 = IN(INSTANTIATED)},
     [SET_INTEGERS] = {.names = {"fmi2SetInteger", "fmi3SetInt32"}, .phases = EVER, .discarded = EITHER_USE},
+    [GET_BOOLEANS] = {.names = {"fmi2GetBoolean", "fmi3GetBoolean"}, .phases = EVER, .not_in_2 = IN(INSTANTIATED)},
+    [SET_BOOLEANS] = {.names = {"fmi2SetBoolean", "fmi3SetBoolean"}, .phases = EVER, .discarded = EITHER_USE},
     [GET_ENUMERATIONS] = {.names = {"fmi2GetInteger", "fmi3GetInt64"}, .phases = EVER},
     [SET_ENUMERATIONS] = {.names = {"fmi2SetInteger", "fmi3SetInt64"}, .phases = EVER},
 
@@ -105,6 +107,23 @@ bool can_be_discarded(const struct instance *instance)
     return instance->services.fmi == 3 || PERMITS[instance->call].discarded & IN(instance->now.use);
 }
 
+/* What this FMU has not got, whatever it is used for; NULL where it has it. */
+static const char *missing(enum call call)
+{
+    const struct model_functions *has = model();
+    switch (call) {
+    case DIRECTIONAL_DERIVATIVE:
+    case ADJOINT_DERIVATIVE:
+        return has->linearize ? NULL : "partial derivatives";
+    case SET_INPUT_RATES:
+        return has->takes_rates ? NULL : "use for derivatives of inputs";
+    case GET_OUTPUT_RATES:
+        return has->output_rate ? NULL : "derivatives of outputs";
+    default:
+        return NULL;
+    }
+}
+
 static unsigned phases_of(const struct permit *permit, const struct instance *instance)
 {
     return instance->services.fmi == 3 ? permit->phases : permit->phases & ~permit->not_in_2;
@@ -139,7 +158,10 @@ bool permitted(struct instance *instance, enum call call, bool given)
         instance->call = call;
     if (!instance || !permitted_always(instance, call_name(instance, call), given))
         return false;
-    if (permit->only && permit->only != (instance->now.use == MODEL_EXCHANGE ? FOR_EXCHANGE : FOR_STEPS))
+    if (missing(call))
+        instance_say(instance, REFUSED, "%s: must not be called: the model has no %s", call_name(instance, call),
+                     missing(call));
+    else if (permit->only && permit->only != (instance->now.use == MODEL_EXCHANGE ? FOR_EXCHANGE : FOR_STEPS))
         instance_say(instance, REFUSED, "%s: must be called of an instance for %s", call_name(instance, call),
                      permit->only == FOR_EXCHANGE ? "model exchange" : "co-simulation");
     else if (!(phases_of(permit, instance) & IN(instance->now.phase)))

@@ -3,9 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "root.h"
-
-static enum verdict check_finite(struct instance *instance, const unsigned *references, unsigned n)
+enum verdict instance_check_finite(struct instance *instance, const unsigned *references, unsigned n)
 {
     for (unsigned i = 0; i < n; i++)
         if (!isfinite(instance->now.reals[references[i]]))
@@ -14,47 +12,26 @@ static enum verdict check_finite(struct instance *instance, const unsigned *refe
     return FINE;
 }
 
-enum verdict instance_observe_motion(struct instance *instance)
+enum verdict instance_observe(struct instance *instance)
 {
     struct content *now = &instance->now;
-    double *reals = now->reals;
-    if (!now->motion_unread)
+    if (!now->unread)
         return FINE;
-    if (instance_take_up(instance) == REFUSED)
+    if (instance_take_up(instance) == REFUSED || model()->observe(instance) == REFUSED)
         return REFUSED;
-    const struct state *s = &now->state;
-    kernel_body_velocity(s, &reals[V_BODY_SURGE], &reals[V_BODY_SWAY]);
-    reals[V_SPEED] = square_root(s->vx * s->vx + s->vy * s->vy);
-    if (check_finite(instance, MOTION, MOTION_COUNT) == REFUSED)
-        return REFUSED;
-    instance_spread(reals, s, STATES, STATE_COUNT);
-    const struct error error = instance_error(now);
-    reals[V_ERROR_POSITION] = error.position;
-    reals[V_ERROR_HEADING] = error.heading;
-    now->motion_unread = false;
+    instance_spread(now->reals, states_of(now), STATES, STATE_COUNT);
+    now->unread = false;
     return FINE;
 }
 
-enum verdict instance_observe_action(struct instance *instance)
+enum verdict instance_observe_on_demand(struct instance *instance)
 {
     struct content *now = &instance->now;
-    double *reals = now->reals;
-    if (!now->action_unread)
+    if (!now->unread_on_demand)
         return FINE;
-    const struct loads loads = kernel_loads_on(&now->state, &now->controls, &now->craft);
-    reals[V_FORCE_X] = loads.x;
-    reals[V_FORCE_Y] = loads.y;
-    reals[V_MOMENT] = loads.moment;
-    reals[V_ACCELERATION_X] = loads.x / now->craft.mass;
-    reals[V_ACCELERATION_Y] = loads.y / now->craft.mass;
-    reals[V_ACCELERATION_YAW] = loads.moment / now->craft.inertia;
-    reals[V_APPLIED_THRUST] = kernel_saturate(&now->controls, &now->craft).thrust;
-    reals[V_APPLIED_STEERING] = kernel_steering(&now->controls, &now->craft);
-    reals[V_STABILITY_NUMBER] = now->stability;
-    reals[V_ROTATION_PER_SUBSTEP] = now->rotation;
-    if (check_finite(instance, ACTION, ACTION_COUNT) == REFUSED)
+    if (model()->observe_on_demand && model()->observe_on_demand(instance) == REFUSED)
         return REFUSED;
-    now->action_unread = false;
+    now->unread_on_demand = false;
     return FINE;
 }
 
@@ -77,26 +54,29 @@ static bool is_real(unsigned reference)
     return reference < VARIABLE_COUNT && VARIABLES[reference].kind == REAL;
 }
 
-static bool is_integer(unsigned reference)
+/* Whether it is of that kind; to get and to set an Enumeration is an Integer, too. */
+static bool is_of(enum kind kind, unsigned reference)
 {
-    return reference < VARIABLE_COUNT && VARIABLES[reference].kind != REAL;
+    if (reference >= VARIABLE_COUNT)
+        return false;
+    const enum kind own = VARIABLES[reference].kind;
+    return own == kind || (kind == INTEGER && own == ENUMERATION);
 }
 
-/* Whether a variable is among ACTION or WATCHED. */
-static bool is_action(unsigned reference)
+static enum verdict no_such_integer(struct instance *instance, enum kind kind, unsigned reference)
 {
-    return instance_place(ACTION, ACTION_COUNT, reference) < ACTION_COUNT ||
-           instance_place(WATCHED, WATCHED_COUNT, reference) < WATCHED_COUNT;
+    return instance_no_such(instance, kind == BOOLEAN ? "Boolean" : "Integer or Enumeration", reference);
 }
 
 enum verdict instance_get_reals(struct instance *instance, const unsigned *references, size_t n, double *values)
 {
-    if (instance_observe_motion(instance) == REFUSED)
+    if (instance_observe(instance) == REFUSED)
         return REFUSED;
     for (size_t i = 0; i < n; i++) {
         if (!is_real(references[i]))
             return instance_no_such(instance, "Real", references[i]);
-        if (instance->now.action_unread && is_action(references[i]) && instance_observe_action(instance) == REFUSED)
+        if (instance->now.unread_on_demand && VARIABLES[references[i]].on_demand &&
+            instance_observe_on_demand(instance) == REFUSED)
             return REFUSED;
     }
     for (size_t i = 0; i < n; i++)
@@ -104,51 +84,24 @@ enum verdict instance_get_reals(struct instance *instance, const unsigned *refer
     return FINE;
 }
 
-enum verdict instance_get_integers(struct instance *instance, const unsigned *references, size_t n, int *values)
+enum verdict instance_get_integers(struct instance *instance, enum kind kind, const unsigned *references, size_t n,
+                                   int *values)
 {
+    if (model()->discrete_is_worked_out && instance_observe(instance) == REFUSED)
+        return REFUSED;
     for (size_t i = 0; i < n; i++)
-        if (!is_integer(references[i]))
-            return instance_no_such(instance, "Integer or Enumeration", references[i]);
+        if (!is_of(kind, references[i]))
+            return no_such_integer(instance, kind, references[i]);
     for (size_t i = 0; i < n; i++)
         values[i] = instance->now.integers[references[i]];
     return FINE;
 }
 
 /* NULL where the value can be, else why not. */
-static const char *broken_rule(enum rule rule, double value)
+static const char *broken_rule(const struct rule *rule, double value)
 {
-    switch (rule) {
-    case POSITIVE:
-        return value > 0.0 ? NULL : "must be greater than 0";
-    case NOT_NEGATIVE:
-        return value < 0.0 ? "must not be negative" : NULL;
-    case FRACTION:
-        return -0.5 <= value && value <= 0.5 ? NULL : "must be from -0.5 (stern) to 0.5 (bow)";
-    case STEP_SIZE_RULE:
-    case TOLERANCE_RULE:
-        return value > 0.0 ? NULL : "must be a finite number greater than 0";
-    case SHARE:
-        return 0.0 <= value && value <= 1.0 ? NULL : "must be from 0 (off) to 1 (the whole moment)";
-    case INTEGRATOR_RULE:
-        return 1.0 <= value && value <= INTEGRATOR_COUNT ? NULL : "must be one of " INTEGRATOR_LIST;
-    case DRAG_AREA_RULE:
-        return 1.0 <= value && value <= DRAG_AREA_COUNT ? NULL : "must be one of " DRAG_AREA_LIST;
-    case INTEGRATOR_NUMBER_RULE:
-        return 0.0 <= value && value <= INTEGRATOR_COUNT ? NULL
-                                                         : "must be 0 (as integrator says) or one of " INTEGRATOR_LIST;
-    case DRAG_AREA_NUMBER_RULE:
-        return 0.0 <= value && value <= DRAG_AREA_COUNT ? NULL
-                                                        : "must be 0 (as drag_area says) or one of " DRAG_AREA_LIST;
-    case ERROR_ESTIMATE_RULE:
-        return 1.0 <= value && value <= ERROR_ESTIMATE_COUNT ? NULL : "must be one of " ERROR_ESTIMATE_LIST;
-    case ERROR_ESTIMATE_NUMBER_RULE:
-        return 0.0 <= value && value <= ERROR_ESTIMATE_COUNT
-                   ? NULL
-                   : "must be 0 (as error_estimate says) or one of " ERROR_ESTIMATE_LIST;
-    case ANY:
-        break;
-    }
-    return NULL;
+    const bool is_inside = (rule->open ? rule->low < value : rule->low <= value) && value <= rule->high;
+    return is_inside ? NULL : rule->why;
 }
 
 /* A state is set in model exchange as SetContinuousStates does it: in FMI 3.0 in event mode too. */
@@ -169,21 +122,22 @@ enum verdict instance_check_settable(struct instance *instance, const struct var
                         PHASE_NAMES[instance->now.phase], variable->role);
 }
 
+const char *instance_why_not(const struct content *content, const struct variable *variable, double value)
+{
+    const unsigned reference = (unsigned)(variable - VARIABLES);
+    const char *why = model()->why_not ? model()->why_not(content, reference, value) : NULL;
+    return why ? why : broken_rule(&variable->rule, value);
+}
+
 static enum verdict check_real(struct instance *instance, const struct variable *variable, double value)
 {
     if (instance_check_settable(instance, variable, value) == REFUSED)
         return REFUSED;
     if (!isfinite(value))
         return instance_say(instance, DISCARDED, "%s = %r: must be a finite number", variable->name, value);
-    if (variable == &VARIABLES[V_SKIRT_FRICTION] && value > 0.0 && instance->now.use == MODEL_EXCHANGE)
-        return instance_say(instance, DISCARDED,
-                            "%s = %r: must be 0 in model exchange: a craft that friction stops, holds and lets go is "
-                            "not smooth; use co-simulation",
-                            variable->name, value);
-    const char *why = broken_rule(variable->rule, value);
+    const char *why = instance_why_not(&instance->now, variable, value);
     if (why)
-        return instance_say(instance, DISCARDED, variable->rule == STEP_SIZE_RULE ? "%s = %r s: %s" : "%s = %r: %s",
-                            variable->name, value, why);
+        return instance_say(instance, DISCARDED, "%s = %r%s: %s", variable->name, value, variable->rule.unit, why);
     return FINE;
 }
 
@@ -192,7 +146,7 @@ static void after_set(struct instance *instance, bool parameter)
 {
     instance->now.tuned = instance->now.tuned || parameter;
     if (instance->now.phase != STEPPING && instance->now.phase != INTERMEDIATE_UPDATE)
-        instance->now.motion_unread = instance->now.action_unread = true;
+        instance->now.unread = instance->now.unread_on_demand = true;
 }
 
 unsigned instance_place(const unsigned *references, unsigned n, unsigned reference)
@@ -206,7 +160,7 @@ unsigned instance_place(const unsigned *references, unsigned n, unsigned referen
 /* A ramp of before ends; one that was set at this communication point stays, so that the order does not matter. */
 static void set_input(struct content *now, unsigned input, double value)
 {
-    memcpy((char *)&now->inputs + input * sizeof(double), &value, sizeof(double));
+    now->inputs[input] = value;
     if (!(now->rated >> input & 1))
         now->rates[input] = 0.0;
 }
@@ -227,7 +181,7 @@ enum verdict instance_set_reals(struct instance *instance, const unsigned *refer
         if (input < INPUT_COUNT)
             set_input(&instance->now, input, values[i]);
         else if (state < STATE_COUNT)
-            memcpy((char *)&instance->now.state + state * sizeof(double), &values[i], sizeof(double));
+            states_of(&instance->now)[state] = values[i];
         else
             parameter = true;
     }
@@ -236,17 +190,16 @@ enum verdict instance_set_reals(struct instance *instance, const unsigned *refer
     return FINE;
 }
 
-/* What can be set are numbers of items of an enumeration, all of them small. */
+/* What can be set are small numbers. */
 static enum verdict check_integer(struct instance *instance, const struct variable *variable, int64_t value)
 {
+    if (variable->kind == BOOLEAN && !is_settable(instance, variable))
+        return instance_say(instance, REFUSED, "%s = %s: must not be set in state '%s' (%s)", variable->name,
+                            value ? "True" : "False", PHASE_NAMES[instance->now.phase], variable->role);
     if (!is_settable(instance, variable))
         return instance_say(instance, REFUSED, "%s = %i: must not be set in state '%s' (%s)", variable->name,
                             (long long)value, PHASE_NAMES[instance->now.phase], variable->role);
-    const char *why = broken_rule(variable->rule, (double)value);
-    const unsigned reference = (unsigned)(variable - VARIABLES);
-    if ((reference == V_ERROR_ESTIMATE || reference == V_ERROR_ESTIMATE_NUMBER) && value == ON &&
-        instance->now.use == MODEL_EXCHANGE)
-        why = "must be off in model exchange: there the error is that of the importer's solver; use co-simulation";
+    const char *why = instance_why_not(&instance->now, variable, (double)value);
     return why ? instance_say(instance, DISCARDED, "%s = %i: %s", variable->name, (long long)value, why) : FINE;
 }
 
@@ -260,11 +213,12 @@ enum verdict instance_check_start(struct instance *instance, unsigned reference,
     return check_integer(instance, variable, (int32_t)value);
 }
 
-enum verdict instance_set_integers(struct instance *instance, const unsigned *references, size_t n, const int *values)
+enum verdict instance_set_integers(struct instance *instance, enum kind kind, const unsigned *references, size_t n,
+                                   const int *values)
 {
     for (size_t i = 0; i < n; i++) {
-        if (!is_integer(references[i]))
-            return instance_no_such(instance, "Integer or Enumeration", references[i]);
+        if (!is_of(kind, references[i]))
+            return no_such_integer(instance, kind, references[i]);
         if (check_integer(instance, &VARIABLES[references[i]], values[i]) == REFUSED)
             return REFUSED;
     }
@@ -280,7 +234,7 @@ enum verdict instance_get_enumerations(struct instance *instance, const unsigned
 {
     for (size_t i = 0; i < n; i++) {
         int value = 0;
-        if (instance_get_integers(instance, &references[i], 1, &value) == REFUSED)
+        if (instance_get_integers(instance, ENUMERATION, &references[i], 1, &value) == REFUSED)
             return REFUSED;
         values[i] = value;
     }
@@ -295,7 +249,30 @@ enum verdict instance_set_enumerations(struct instance *instance, const unsigned
             return REFUSED;
     for (size_t i = 0; i < n; i++) {
         const int value = (int)values[i];
-        instance_set_integers(instance, &references[i], 1, &value);
+        instance_set_integers(instance, ENUMERATION, &references[i], 1, &value);
+    }
+    return FINE;
+}
+
+enum verdict instance_get_booleans(struct instance *instance, const unsigned *references, size_t n, bool *values)
+{
+    for (size_t i = 0; i < n; i++) {
+        int value = 0;
+        if (instance_get_integers(instance, BOOLEAN, &references[i], 1, &value) == REFUSED)
+            return REFUSED;
+        values[i] = value != 0;
+    }
+    return FINE;
+}
+
+enum verdict instance_set_booleans(struct instance *instance, const unsigned *references, size_t n, const bool *values)
+{
+    for (size_t i = 0; i < n; i++)
+        if (check_integer(instance, &VARIABLES[references[i]], values[i]) == REFUSED)
+            return REFUSED;
+    for (size_t i = 0; i < n; i++) {
+        const int value = values[i];
+        instance_set_integers(instance, BOOLEAN, &references[i], 1, &value);
     }
     return FINE;
 }
