@@ -2,6 +2,7 @@
 
 import runpy
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,7 @@ def test_the_command_ends_well_where_it_compiled(
     monkeypatch: pytest.MonkeyPatch, reason: str, status: int | str
 ) -> None:
     monkeypatch.setattr(machine_code, "compile_all", lambda *_: reason)
+    monkeypatch.delitem(sys.modules, "hovercraft_fmu.libraries")  # it is run anew
     with pytest.raises(SystemExit) as ended:
         runpy.run_module("hovercraft_fmu.libraries", run_name="__main__")
     assert ended.value.code == status
