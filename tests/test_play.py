@@ -13,9 +13,10 @@ from playwright.sync_api import Browser, ConsoleMessage, Error, Page, expect
 
 from hovercraft_fmu.fmu.description import NATIVE
 from hovercraft_fmu.fmu.interface import INPUTS, STATES, VARIABLES
-from hovercraft_fmu.fmu.machine_code import BROWSER, NotCompiledError, compile_all
+from hovercraft_fmu.fmu.machine_code import BROWSER, NotCompiledError
 from hovercraft_fmu.fmu.start_values import variant
 from hovercraft_fmu.host import Fmu
+from hovercraft_fmu.libraries import compile_libraries
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.view.page import FILE, FOLDER, page
@@ -35,7 +36,7 @@ def file(built: Built) -> Path:
     """The page of this tree."""
 
     def make(path: Path) -> Path:
-        compile_all([BROWSER])
+        compile_libraries([BROWSER])
         path.write_bytes(page())
         return path
 

@@ -92,6 +92,8 @@ class Flavour:
     """Its C; None: it is not machine code."""
     fmi: Literal[2, 3] = 2
     """The version of the standard."""
+    in_browsers: bool = False
+    """It is compiled for browsers, too: view/page has a page that carries it."""
     variant_of: "Flavour | None" = None
     """Whose code it has, with start values of its own."""
 
@@ -173,6 +175,7 @@ NATIVE3 = Flavour(
     categories=MappingProxyType(LOG_CATEGORIES),
     native=CRAFT_NATIVE,
     fmi=3,
+    in_browsers=True,
 )
 
 

@@ -134,7 +134,7 @@ def library(flavour: Flavour) -> Library:
         **{f"{flavour.identifier}/{name}": content for name, content in own.items()},
         **_units(flavour),
     }
-    targets = (*PLATFORMS, BROWSER) if flavour is NATIVE3 else tuple(PLATFORMS)
+    targets = (*PLATFORMS, BROWSER) if flavour.in_browsers else tuple(PLATFORMS)
     return Library(flavour.identifier, tuple(_units(flavour)), files, targets)
 
 

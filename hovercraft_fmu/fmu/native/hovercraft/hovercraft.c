@@ -109,7 +109,7 @@ static struct error error_of(const struct model *m)
     if (!m->estimates)
         return (struct error){0.0, 0.0};
     const struct method *method = method_of(m);
-    return kernel_estimated_error(&m->state, &m->companion, &m->craft,
+    return kernel_estimated_error(&m->state, &m->companion,
                                   m->craft.skirt_friction != 0.0 ? method->rubbing_order : method->order);
 }
 
