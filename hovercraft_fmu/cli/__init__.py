@@ -88,6 +88,7 @@ for each in (
     demos.demo,
     many.measure,
     many.sweep,
+    files.docs,
     files.cross_check,
 ):
     each.params += [QUIET_OPTION, VERBOSE_OPTION]

@@ -176,6 +176,18 @@ def _checked_table(checks: "list[Check]") -> str:
     return markdown(("checker or host", "version", "what was run", "result"), rows)
 
 
+@click.command("docs")
+@click.option("--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR", default=FOLDER / "docs",
+              show_default=True)  # fmt: skip
+def docs(output: Path) -> None:
+    """Write the pages of every FMU as a site, for a browser or a web server."""
+    from ..building.site import build_site
+
+    with progress_of(1.0, "writing pages"):
+        page = build_site(output)
+    OUTPUT.print(f"wrote {page}: open it in a browser")
+
+
 @click.command("cross-check")
 @click.argument("folder", metavar="DIR", type=PathOf(path_type=Path, file_okay=False))
 def cross_check(folder: Path) -> None:

@@ -3,17 +3,19 @@
 Those of measurements, results.html and sweeps.html with their pictures, are there as `studies/pages.py` wrote them.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import jinja2
+from markupsafe import Markup, escape
 
 from .._version import __version__
 from ..model.craft import DRAG_AREAS, PRESETS
 from ..model.integrators import INTEGRATORS
 from .description import FMI_3_TYPES, NATIVE, NATIVE3, PYTHON, Flavour
-from .interface import WARNINGS
+from .interface import ACTUATORS, CRAFT_PARAMETERS, WARNINGS
 from .variable import Variable
 
 FOLDER = Path(__file__).parent / "documentation"
@@ -79,9 +81,64 @@ def rendered(folder: Path, values: Mapping[str, Any]) -> dict[str, str]:
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
     )
-    environment.globals.update(version=__version__, limits=_limits)
+    environment.globals.update(version=__version__, limits=_limits, grouped=_grouped, math=_math)
     names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.html.jinja"))
-    return {name.removesuffix(".jinja"): environment.get_template(name).render(values) for name in names}
+    return {
+        name.removesuffix(".jinja"): _with_contents(environment.get_template(name).render(values)) for name in names
+    }
+
+
+def _with_contents(page: str) -> str:
+    """With a list of its sections before the first, each with an anchor."""
+    titles = re.findall(r"<h2>(.*?)</h2>", page, re.DOTALL)
+    anchors = [re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") for title in titles]
+    for title, anchor in zip(titles, anchors, strict=True):
+        page = page.replace(f"<h2>{title}</h2>", f'<h2 id="{anchor}">{title}</h2>', 1)
+    links = "".join(f'<li><a href="#{anchor}">{title}</a></li>' for title, anchor in zip(titles, anchors, strict=True))
+    return page.replace("<h2 id=", f"<nav><ul>{links}</ul></nav>\n\n<h2 id=", 1)
+
+
+def _grouped(variables: Iterable[Variable]) -> dict[str, list[Variable]]:
+    """As people look for them, and terminals have them: what stands before the dot, commands, the craft, the rest."""
+    groups: dict[str, list[Variable]] = {}
+    for variable in variables:
+        prefix = variable.name.rpartition(".")[0]
+        if variable.name in ACTUATORS:
+            prefix = "actuators"
+        elif variable.name in CRAFT_PARAMETERS:
+            prefix = "craft"
+        elif not prefix:
+            prefix = {"parameter": "settings", "output": "outputs"}.get(variable.causality, "watched")
+        groups.setdefault(prefix, []).append(variable)
+    return groups
+
+
+GREEK = {"psi": "&psi;", "rho": "&rho;"}
+TOKEN = re.compile(r"([A-Za-z]+)(?:_([A-Za-z]+))?|([0-9.]+)|(.)")
+"""Of a formula: a name with or without an index, a number, a sign."""
+
+
+def _math(formula: str) -> Markup:
+    """A formula in one line as MathML, which browsers draw by themselves: names with indices, signs, sqrt(...)."""
+
+    def drawn(text: str) -> str:
+        if root := re.fullmatch(r"(.*)sqrt\((.*)\)", text):
+            return f"{drawn(root[1])}<msqrt>{drawn(root[2])}</msqrt>"
+        if fraction := re.fullmatch(r"(.*?)(\w+)/(\w+)(.*)", text):
+            top, bottom = (f"<mrow>{drawn(each)}</mrow>" for each in fraction.group(2, 3))
+            return f"{drawn(fraction[1])}<mfrac>{top}{bottom}</mfrac>{drawn(fraction[4])}"
+        found = ""
+        for name, index, number, sign in TOKEN.findall(text.replace(" ", "")):
+            name = GREEK.get(name, name)
+            if index:
+                found += f"<msub><mi>{name}</mi><mi>{index}</mi></msub>"
+            elif name or number:
+                found += f"<mi>{name}</mi>" if name else f"<mn>{number}</mn>"
+            else:
+                found += f"<mo>{'&#x2062;' if sign == '*' else escape(sign)}</mo>"
+        return found
+
+    return Markup(f'<math display="block">{drawn(formula)}</math>')  # noqa: S704 - formulas of these pages
 
 
 def _checked(table: Path) -> list[list[str]]:
