@@ -5,12 +5,17 @@ import zipfile
 import zlib
 from html.parser import HTMLParser
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
 from PIL import Image
 
+from hovercraft_fmu.building import PRODUCTS
+from hovercraft_fmu.fmu import document
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from hovercraft_fmu.fmu.document import FOLDER
 from hovercraft_fmu.studies.pages import PICTURES, SHOWS, pages, shown
+from tests.shell import Shell
 
 SIZE_MAX, DOCUMENTS_MAX = 600_000, 16
 PAGE_MAX = 250_000
@@ -59,6 +64,42 @@ def test_the_documentation_of_a_python_fmu_is_complete_and_small(name: str, requ
 
 def test_the_documentation_of_a_native_fmu_is_complete_and_small(complete_native_fmu: Path) -> None:
     assert_complete_and_small(complete_native_fmu)
+
+
+@pytest.mark.parametrize("flavour", [PYTHON, NATIVE, NATIVE3], ids=lambda each: each.identifier)
+def test_every_page_has_a_list_of_its_sections(flavour: Flavour) -> None:
+    for name, page in {**document.pages(flavour), **{name: each.decode() for name, each in pages().items()}}.items():
+        anchors = re.findall(r'<h2 id="([a-z0-9-]+)">', page)
+        assert len(set(anchors)) == len(anchors) == page.count("<h2") > 3, name
+        assert {link for link in Links(page).found if link.startswith("#")} == {f"#{anchor}" for anchor in anchors}
+
+
+def test_formulas_are_mathml_and_variables_are_in_groups() -> None:
+    page = document.pages(NATIVE)["index.html"]
+    formulas = [
+        ET.fromstring(each.replace("&psi;", "p").replace("&rho;", "r")) for each in re.findall("<math.*?</math>", page)
+    ]
+    texts = ["".join(each.itertext()).replace("\u2062", "*") for each in formulas]
+    assert texts[:2] == ["w=v+r*xd", "q=u*u+w*w"]
+    assert formulas[1].find("msqrt") is not None
+    assert texts[-1] == "I*drdt=N"
+    assert formulas[-1].find("mfrac") is not None
+    assert "1 semi_implicit_euler, 2 drag_implicit, 3 rk4" in page
+    assert page.index(">craft</th>") < page.index("<code>mass</code></td>")
+    shown = re.findall(r"<tr><td><code>([\w.]+)</code></td>", page[page.index('id="variables"') :])
+    assert sorted(shown) == sorted(variable.name for variable in NATIVE.model.variables)
+
+
+@pytest.mark.once
+@pytest.mark.usefixtures("complete_native_fmu")
+def test_the_site_is_whole(shell: Shell) -> None:
+    """Every page of every FMU, and nothing that is referred to is missing."""
+    shell.ok("docs")
+    site = shell.folder / "build" / "docs"
+    found = {page: Links(page.read_text(encoding="utf-8")).found for page in site.rglob("*.html")}
+    assert len(found[site / "index.html"]) == len([each for each in PRODUCTS.values() if each.name.endswith(".fmu")])
+    for page, links in found.items():
+        assert all((page.parent / link).is_file() for link in links if not re.match("https?:|#|data:", link)), page
 
 
 def assert_complete_and_small(fmu: Path) -> None:

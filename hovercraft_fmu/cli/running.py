@@ -185,7 +185,7 @@ def drive(
     communication_step: float | None,
     time_scale: float,
 ) -> None:
-    """Drive the FMU from the keyboard: the arrow keys, in a window, in real time.
+    """Drive the FMU from the keyboard: arrows or WASD, in a window, in real time; G lays a course of gates.
 
     FMU is the file; without it build/HovercraftNative.fmu, which is built if it is not there. H shows the keys. What is
     recorded replays to the same bits, with the command that is printed at the end.

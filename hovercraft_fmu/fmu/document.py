@@ -105,6 +105,8 @@ def _grouped(variables: Iterable[Variable]) -> dict[str, list[Variable]]:
         prefix = variable.name.rpartition(".")[0]
         if variable.name in ACTUATORS:
             prefix = "actuators"
+        elif prefix.startswith("external"):
+            prefix = "load"
         elif variable.name in CRAFT_PARAMETERS:
             prefix = "craft"
         elif not prefix:

@@ -1,4 +1,4 @@
-"""Where metres lie on the screen. The view wraps at its edges; the model does not."""
+"""Where metres lie on the screen. A view that stands still wraps at its edges, one that follows does not."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ def wrapped(value: float, size: float) -> float:
 
 
 class Camera(NamedTuple):
-    """A view that stands still."""
+    """A view that stands still, or one that follows the craft."""
 
     width: int
     """pixels"""
@@ -26,9 +26,16 @@ class Camera(NamedTuple):
     """pixels"""
     scale: float
     """pixels a metre, both ways"""
+    followed: Point | None = None
+    """m: the place in its middle, of one that follows"""
 
     def place(self, x: float, y: float) -> Point:
-        """Where a point [m] is drawn [pixels], inside the view."""
+        """Where a point [m] is drawn [pixels]; inside the view, where it stands still."""
+        if self.followed:
+            return (
+                0.5 * self.width + self.scale * (x - self.followed[0]),
+                0.5 * self.height + self.scale * (y - self.followed[1]),
+            )
         return (
             wrapped(START[0] * self.width + self.scale * x, self.width),
             wrapped(START[1] * self.height + self.scale * y, self.height),
@@ -41,7 +48,9 @@ class Camera(NamedTuple):
     def copies(self, points: Sequence[Point]) -> Iterator[list[Point]]:
         """The points, and again on the far side where they reach over an edge: whatever of it can be seen."""
         xs, ys = zip(*points, strict=True)
-        for right, down in itertools.product((0, -self.width, self.width), (0, -self.height, self.height)):
+        moves = (((0, 0),) if self.followed else
+                 itertools.product((0, -self.width, self.width), (0, -self.height, self.height)))  # fmt: skip
+        for right, down in moves:
             in_x = max(xs) + right >= 0.0 and min(xs) + right < self.width
             in_y = max(ys) + down >= 0.0 and min(ys) + down < self.height
             if in_x and in_y:

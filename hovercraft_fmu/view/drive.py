@@ -22,6 +22,7 @@ from ..simulation import Run, Stepper, check_effect, plan, stepping
 from ..simulation.control_log import ENDED, RECORDED
 from ..stopping import SIGNALS
 from ..whole import check_writable, write_whole
+from .gates import Course, Pose
 from .operator import PRESET, TIME_SCALE, Action, Operator, Pace
 from .window import Frame, Window, pygame
 
@@ -40,10 +41,14 @@ HELD_KEYS: Mapping[int, Action] = {
     pygame.K_DOWN: Action.LESS_THRUST,
     pygame.K_RIGHT: Action.PORT_THRUSTER,
     pygame.K_LEFT: Action.STARBOARD_THRUSTER,
-    pygame.K_d: Action.WIND_RIGHT,
-    pygame.K_a: Action.WIND_LEFT,
-    pygame.K_s: Action.WIND_DOWN,
-    pygame.K_w: Action.WIND_UP,
+    pygame.K_w: Action.MORE_THRUST,
+    pygame.K_s: Action.LESS_THRUST,
+    pygame.K_d: Action.PORT_THRUSTER,
+    pygame.K_a: Action.STARBOARD_THRUSTER,
+    pygame.K_l: Action.WIND_RIGHT,
+    pygame.K_j: Action.WIND_LEFT,
+    pygame.K_k: Action.WIND_DOWN,
+    pygame.K_i: Action.WIND_UP,
 }
 FASTER = (pygame.K_PLUS, pygame.K_EQUALS, pygame.K_KP_PLUS)
 SLOWER = (pygame.K_MINUS, pygame.K_KP_MINUS)
@@ -83,7 +88,8 @@ def plan_drive(
     Raises ValueError as `plan` does, and for an impossible craft or step.
     """
     check_effect(start_values or {}, KEYED, "a drive")
-    run = plan(signals([(0.0,)]), preset=preset, start_values=start_values, communication_step=communication_step)
+    values = {INPUTS[0]: 0.0, **(start_values or {})}  # it starts at rest, and stays so until a key is held
+    run = plan(signals([(0.0,)]), preset=preset, start_values=values, communication_step=communication_step)
     step = run.communication_step
     if not SHORTEST_STEP <= step <= LONGEST_STEP:
         raise ValueError(
@@ -284,6 +290,7 @@ class _Loop:
         self._flight, self._window, self._clock = flight, window, clock
         self._pace = Pace(flight.step_size, time_scale, clock.now())
         self._paused = self._help = self._late = self._ended = False
+        self._course: Course | None = None
         self.stopped = 0
         """The signal that ended it."""
 
@@ -309,6 +316,8 @@ class _Loop:
         for _ in range(min(due, most)):
             self._flight.step()
             self._pace.take()
+            if self._course:
+                self._course.go(self._pose, self._flight.time)
             if self._clock.now() - now > LONGEST_LAG:
                 self._late = True
                 break
@@ -334,22 +343,31 @@ class _Loop:
             self._help = not self._help
         elif key == pygame.K_c:
             self._flight.operator.calm()
+        elif key == pygame.K_f:
+            self._window.follows = not self._window.follows
+        elif key == pygame.K_g:
+            self._course = None if self._course else Course(self._pose)
         elif key == pygame.K_r:
             self._flight.reset()
             self._window.clear()
+            self._course = Course(self._pose) if self._course else None
             self._pace.restart(self._clock.now())
         elif key in FASTER or key in SLOWER:
             scale = self._pace.scale * (2.0 if key in FASTER else 0.5)
             self._pace.rescale(min(max(scale, SLOWEST), FASTEST), self._clock.now())
 
-    def _shown(self) -> Frame:
+    @property
+    def _pose(self) -> Pose:
         state = self._flight.state
+        return state.x, state.y, state.heading
+
+    def _shown(self) -> Frame:
         notes = [f"warning: {each}" for each in self._flight.warnings]
         if self._late:
             notes.append("this machine cannot keep up: the drive runs slower than asked (- halves it)")
         return Frame(
-            self._flight.time, (state.x, state.y, state.heading), self._flight.speed, self._flight.operator.controls,
-            self._pace.scale, self._paused, self._help, notes,
+            self._flight.time, self._pose, self._flight.speed, self._flight.operator.controls,
+            self._pace.scale, self._paused, self._help, notes, self._course,
         )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from ..fmu.icon import outline
 from ..model.craft import Craft
 from ..model.dynamics import Controls
 from .camera import Camera, Point
+from .gates import Course
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 try:
@@ -40,15 +41,18 @@ TRAIL_SPACING = 5.0
 HELP = (
     ("up, down", "more thrust, less thrust: 1 N/s while held"),
     ("right, left", "turn to starboard, to port: a bow thruster while held"),
-    ("W A S D", "wind: 0.1 m/s more up, left, down, right each second held"),
+    ("W A S D", "the same, as the arrows"),
+    ("I J K L", "wind: 0.1 m/s more up, left, down, right each second held"),
     ("C", "calm: no wind"),
+    ("G", "a course of gates, and a clock that the first one starts"),
+    ("F", "the view follows the craft, or stands still and wraps"),
     ("+  -", "time runs twice as fast, half as fast"),
     ("space", "pause"),
     ("R", "reset: back to the start, a new record"),
     ("H", "this help"),
     ("Esc", "end"),
 )
-HINT = "arrows drive   WASD wind   space pause   R reset   + - time   H help   Esc end"
+HINT = "arrows drive   G gates   F follow   IJKL wind   space pause   R reset   + - time   H help   Esc end"
 
 
 class Frame(NamedTuple):
@@ -67,6 +71,7 @@ class Frame(NamedTuple):
     help: bool = False
     notes: Sequence[str] = ()
     """What is to be told: warnings."""
+    course: Course | None = None
 
 
 def check_display() -> None:
@@ -104,17 +109,18 @@ class Window:
         self._small, self._large = pygame.font.Font(None, 20), pygame.font.Font(None, 34)
         self._scale = SIZE[0] / (VIEW_LENGTHS * max(craft.length, craft.width))
         self._trail: list[Point] = []
+        self.follows = False
+        """Whether the view goes with the craft."""
 
     @staticmethod
     def close() -> None:
         """It is gone."""
         pygame.quit()
 
-    @property
-    def camera(self) -> Camera:
-        """Of the window as large as it is now."""
+    def camera(self, here: Point) -> Camera:
+        """Of the window as large as it is now, with the craft here [m]."""
         width, height = self._screen.get_size()
-        return Camera(width, max(height - BAR, 1), self._scale)
+        return Camera(width, max(height - BAR, 1), self._scale, here if self.follows else None)
 
     @property
     def _screen(self) -> "pygame.Surface":
@@ -129,12 +135,15 @@ class Window:
 
     def draw(self, shown: Frame) -> None:
         """One frame, on the screen."""
-        screen, camera = self._screen, self.camera
+        here = (shown.pose[0], shown.pose[1])
+        screen, camera = self._screen, self.camera(here)
         screen.fill(PANEL)
         view = screen.subsurface((0, 0, camera.width, min(camera.height, screen.get_height())))
         view.fill(GROUND)
         self._draw_grid(view, camera)
-        self._draw_trail(view, camera, (shown.pose[0], shown.pose[1]))
+        self._draw_trail(view, camera, here)
+        if shown.course:
+            self._draw_gates(view, camera, shown.course)
         self._draw_craft(view, camera, shown)
         self._draw_instruments(screen, shown)
         self._draw_words(view, shown)
@@ -145,6 +154,7 @@ class Window:
     def _draw_grid(self, view: "pygame.Surface", camera: Camera) -> None:
         spacing = self._craft.length * camera.scale
         x, y = camera.place(0.0, 0.0)
+        x, y = (x % spacing, y % spacing) if camera.followed else (x, y)
         for i in range(-int(x / spacing), int((camera.width - x) / spacing) + 1):
             pygame.draw.line(view, GRID, (x + i * spacing, 0), (x + i * spacing, camera.height))
         for i in range(-int(y / spacing), int((camera.height - y) / spacing) + 1):
@@ -161,9 +171,18 @@ class Window:
             right, down = camera.scale * (b[0] - a[0]), camera.scale * (b[1] - a[1])
             if max(abs(right), abs(down)) > camera.height:
                 continue  # faster than the view can tell
-            color = pygame.Color(GROUND).lerp(TRAIL, 0.15 + 0.85 * (i + 1) / len(points))
+            color = pygame.Color(GROUND).lerp(TRAIL, (i + 1) / len(points))
             for start, end in camera.copies([(x, y), (x + right, y + down)]):
                 pygame.draw.aaline(view, color, start, end, 2)
+
+    def _draw_gates(self, view: "pygame.Surface", camera: Camera, course: Course) -> None:
+        """Port is red and starboard green, as at sea; the next gate is bright."""
+        for i, (posts, is_ahead) in enumerate(course.posts):
+            for port, starboard in camera.copies([camera.place(*post) for post in posts]):
+                if is_ahead:
+                    pygame.draw.aaline(view, TEXT if i == course.next else FAINT, port, starboard, 2)
+                for point, name in ((port, "port"), (starboard, "starboard")):
+                    pygame.draw.aacircle(view, WINDOW_JETS[name] if is_ahead else GRID, point, 6)
 
     def _draw_craft(self, view: "pygame.Surface", camera: Camera, shown: Frame) -> None:
         for points in camera.copies(camera.body(shown.pose, outline(self._craft))):
@@ -182,6 +201,9 @@ class Window:
         self._write(view, f"a square is {self._craft.length:g} m", (view.get_width() - 16, 14), FAINT, right=True)
         for i, note in enumerate(shown.notes):
             self._write(view, note, (16, 40 + 22 * i), WARNING)
+        if shown.course:
+            words = f"{shown.course.words}   {shown.course.clock(shown.time):.1f} s"
+            self._write(view, words, (view.get_width() - 16, 40), TEXT, self._large, right=True)
         if shown.paused:
             self._write(view, "PAUSED", (view.get_width() / 2 - 48, 14), TEXT, self._large)
         if shown.help:
