@@ -10,11 +10,12 @@ def main() -> None:
     for each in (_signal.SIGINT, _signal.SIGTERM):
         if _signal.getsignal(each) != _signal.SIG_IGN:
             _signal.signal(each, _leave)
+    _open_streams()  # before anything else gets their numbers
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files: what a terminal of Jupyter asks for may not be here
     from . import stopping
 
     stopping.watch()
     try:
-        _open_streams()
         from .cli import main as command
 
         command()

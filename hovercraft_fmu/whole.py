@@ -15,7 +15,7 @@ RULE = "must be in a folder that can be written to, with room for it"
 PREFIX = f"hovercraft_{os.getpid()}_"
 """Of all temporary folders of this process."""
 OURS = re.compile(r"hovercraft_(\d+)_\w+")
-SAFE = re.compile(r"[A-Za-z0-9_.,/\\:~ -]*")
+SAFE = re.compile(r"[A-Za-z0-9_./\\:~ -]*")
 """A path that pythonfmu's wrapper survives: with others the process dies while an FMU is loaded."""
 DAY = 86400.0
 """s"""
@@ -109,8 +109,8 @@ def check_survived(folder: str) -> None:
     """Raises OSError where a Python FMU would end the process when it is loaded from there."""
     if not SAFE.fullmatch(folder):
         raise OSError(
-            f"{folder}: the temporary folder must have no letters but A to Z and none of # + ( % & @ in its path, or a "
-            "Python FMU ends the process; set TMPDIR to another one, or take a native FMU"
+            f"{folder}: the temporary folder must have no letters but A to Z, no # + ( % , @ and the like in its path: "
+            "a Python FMU ends the process there; set TMPDIR to another one, or take a native FMU"
         )
 
 

@@ -77,6 +77,8 @@ def _finite(value: Any) -> Any:
 
 def one_line(error: Exception) -> str:
     """What went wrong."""
+    if isinstance(error, FileNotFoundError) and error.errno and not error.filename:
+        return "the folder that this is called in is gone: change to another one"
     if isinstance(error, OSError) and error.filename:
         return f"{error.filename}: {error.strerror}"
     return " ".join(str(error).split())

@@ -82,8 +82,19 @@ def _extract(path: Path, folder: str) -> None:
         raise
     except Exception as error:  # fmpy and zipfile raise many kinds
         raise ValueError(f"{path}: must be an archive that can be extracted; {error}") from error
-    if Path(folder, PYTHON_PART).exists():
-        check_survived(folder)
+    _check_python_part(path, Path(folder))
+
+
+def _check_python_part(path: Path, folder: Path) -> None:
+    """pythonfmu's wrapper does not look whether there is what it needs, and then the process dies."""
+    part = folder / PYTHON_PART
+    if part.exists():
+        check_survived(str(folder))
+        module = Path(PYTHON_PART).with_name(f"{part.read_text(encoding='utf-8', errors='replace').strip()}.py")
+        if not (folder / module).is_file():
+            raise ValueError(f"{path}: must have {module.as_posix()}, which {PYTHON_PART} names")
+    elif any(part.name.encode() in binary.read_bytes() for binary in folder.glob("binaries/*/*") if binary.is_file()):
+        raise ValueError(f"{path}: must have {PYTHON_PART}, which its binary asks for")
 
 
 def read_description(path: Path, validate: bool = True, model: str | None = None) -> Any:
@@ -94,6 +105,8 @@ def read_description(path: Path, validate: bool = True, model: str | None = None
         ValueError: the file is no FMU for co-simulation, FMI 2.0 or 3.0, its description is not valid, or it is of
             another model than the given one.
     """
+    if path.is_dir():
+        raise IsADirectoryError(f"{path}: must be an FMU, and is a folder")
     if not path.is_file():
         hint = beside(path) or "; 'hovercraft-fmu build' writes them into build/"
         raise FileNotFoundError(f"{path}: no such FMU{hint}")
