@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
-from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, integrator, integrator_number
+from hovercraft_fmu.model.integrators import (
+    INTEGRATORS,
+    StepTooSmallError,
+    integrator,
+    integrator_number,
+    semi_implicit_euler,
+)
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance
 from hovercraft_fmu.scenes import COAST_SPEED, SCENES
 from tests.strategies import calm_crafts, controls, crafts, numbers, rubbing_crafts, states
@@ -209,9 +215,78 @@ def test_adaptive_ends_exactly_on_time(steps: list[float]) -> None:
     assert state.x == pytest.approx(math.fsum(steps), rel=1e-13)
 
 
+def test_adaptive_sees_every_turn_of_a_spin() -> None:
+    """90 turns a second and a first step of 1 s: every stage finds the heading of the start, but for whole turns."""
+    w, thrust, craft = 2.0 * math.pi * 90.0, 5.0, Craft(drag_coefficient=0.0)
+    made = advance(State(yaw_rate=w), Controls(thrust), craft, 2.0, Settings(1.0, method("adaptive")))
+    assert made.rotation <= 1.0
+    exact = thrust / (craft.mass * w) * 2.0  # m: abeam; along the thrust it has come back
+    assert made.state[:2] == pytest.approx((0.0, exact), abs=1e-4)
+
+
+def test_adaptive_turns_no_further_where_a_push_begins_to_turn_it() -> None:
+    """From rest the first step knows nothing of the turn; 1.5 rad/s2 over 20 s lead to 300 rad."""
+    craft = Craft(drag_coefficient=0.0, inertia=20.0)
+    made = advance(State(), Controls(5.0, 1.0, 0.0), craft, 20.0, Settings(20.0, method("adaptive"), 1e3))
+    assert made.state.heading == pytest.approx(300.0, rel=1e-12)
+    assert made.substeps >= 300
+
+
+def test_right_after_a_refused_step_adaptive_does_not_take_a_longer_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    from hovercraft_fmu.model import integrators
+
+    tried: list[tuple[float, bool]] = []
+    one_step = integrators._dormand_prince
+
+    def seen(y: Any, first: Any, h: float, rates_at: Any) -> Any:
+        made = one_step(y, first, h, rates_at)
+        tried.append((h, made[2] <= 1e-6))
+        return made
+
+    monkeypatch.setattr(integrators, "_dormand_prince", seen)
+    for course in np.linspace(0.0, 6.0, 20):  # where the drag point comes through rest
+        start = State(vx=math.cos(course), vy=math.sin(course), yaw_rate=0.2)
+        advance(start, Controls(0.0), Craft(), 20.0, Settings(5.0, method("adaptive")))
+    after = [(b[0], c[0]) for a, b, c in zip(tried, tried[1:], tried[2:], strict=False) if not a[1] and b[1] and c[1]]
+    assert len(after) > 20
+    assert all(longer <= h for h, longer in after)
+
+
+def test_adaptive_that_finds_no_end_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thruster, no drag, a day: 5184 rad/s in the end, and 2e8 rad; of 10^8 steps a test has time for a thousand."""
+    monkeypatch.setattr("hovercraft_fmu.model.integrators.MAX_TRIED", 1000)
+    with pytest.raises(
+        ValueError, match=r"86400.0 s: must not need more than 10\^8 sub-steps to meet tolerance = 1e-06"
+    ):
+        advance(State(), Controls(0.0, 1.0), Craft(drag_coefficient=0.0), 86400.0, Settings(1.0, method("adaptive")))
+
+
+def test_a_run_that_is_not_finite_ends_before_all_its_substeps() -> None:
+    taken: list[int] = []
+
+    def counting(*arguments: Any) -> Any:
+        taken.append(arguments[-1])
+        return semi_implicit_euler(*arguments)._replace(state=State(vx=math.nan))
+
+    with pytest.raises(NonFiniteError, match="vx = nan"):
+        advance(State(), NONE, Craft(), 1e6, Settings(0.001, INTEGRATORS[0]._replace(integrate=counting)))
+    assert sum(taken) < 10**5 < 10**9
+
+
+def test_long_runs_are_not_changed_by_looking_whether_they_are_finite() -> None:
+    """Two hundred thousand sub-steps in one communication step, and in twenty."""
+    state, way = State(vx=0.2, yaw_rate=0.1), Settings(0.001)
+    whole = advance(state, Controls(8.0, 0.5), Craft(), 200.0, way)
+    stability = 0.0
+    for _ in range(20):
+        part = advance(state, Controls(8.0, 0.5), Craft(), 10.0, way)
+        state, stability = part.state, max(stability, part.stability)
+    assert (whole.state, whole.substeps, whole.stability) == (state, 200_000, stability)
+
+
 def test_adaptive_says_where_it_cannot_go_on() -> None:
     hard = Craft(mass=1e-3, inertia=1e-3, air_density=1000.0)
-    with pytest.raises(StepTooSmallError, match=r"must not fall below 1e-12 s to meet tolerance = 1e-14; set a larger"):
+    with pytest.raises(StepTooSmallError, match=r"below 1e-12 s, .* to meet tolerance = 1e-14; set a larger"):
         advance(State(vx=1e6), NONE, hard, 1.0, Settings(1e-3, method("adaptive"), 1e-14))
 
 

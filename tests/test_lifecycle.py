@@ -562,7 +562,7 @@ def test_where_the_adaptive_method_cannot_go_on_it_says_so(instance: Any, messag
     before = everything(instance)
     with pytest.raises(FMICallException):
         instance.doStep(0.0, 1.0)
-    assert "must not fall below 1e-12 s to meet tolerance = 1e-14; set a larger tolerance" in messages[-1]
+    assert "to meet tolerance = 1e-14; set a larger tolerance" in messages[-1]
     assert everything(instance) == before
 
 

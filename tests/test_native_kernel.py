@@ -3,6 +3,7 @@
 import math
 import random
 from ctypes import byref, c_double
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -260,6 +261,36 @@ def test_a_ramp_saturates_and_stays_there(method: str, libm: Kernel) -> None:
     assert outcome == "advanced"
     assert made.state.vx == pytest.approx((8.0 + 1.0 + 4 * 10.0) / 100.0, abs=2e-5)
     assert saturate(Controls(18.0, 0.0, 0.0), craft).thrust == 10.0
+
+
+def test_a_step_of_adaptive_ends_where_a_ramp_saturates(libm: Kernel) -> None:
+    """So each is smooth: without drag the fifth order is exact, whatever the tolerance. All three inputs, both ways."""
+    craft, start, rate = Craft(drag_coefficient=0.0), Controls(9.0, 0.3, 0.9), Controls(0.7, -0.2, 0.05)
+    outcome, made = libm.advance(State(), start, craft, 10.0, Settings(20.0, METHODS["adaptive"], 1e3), rate=rate)
+    port, starboard = 0.3 * 0.3 / (2.0 * 0.2), 10.0 - 0.5 * 0.1 * 0.1 / 0.05  # command times s; in limits 0 and 1
+    assert outcome == "advanced"
+    assert made.substeps >= 4
+    assert made.state.yaw_rate == pytest.approx(30.0 / 500.0 * (port - starboard), rel=1e-12)
+
+
+def test_adaptive_that_finds_no_end_is_stopped(tmp_path: Path, libm: Kernel) -> None:
+    """In C as in Python, where the limit is a thousand steps."""
+    few = Kernel(
+        compile_c(tmp_path / "few.so", [KERNEL, ROUNDING], "-DHOVERCRAFT_LIBM", "-DHOVERCRAFT_MAX_TRIED=1000", *SHARED)
+    )
+    craft, way = Craft(drag_coefficient=0.0), Settings(1.0, METHODS["adaptive"])
+    for duration, outcome in ((86400.0, "too many sub-steps"), (60.0, "advanced")):
+        assert few.advance(State(), Controls(0.0, 1.0), craft, duration, way)[0] == outcome
+    assert libm.advance(State(), Controls(0.0, 1.0), craft, 600.0, way)[0] == "advanced"
+
+
+def test_a_run_that_is_not_finite_ends_at_once(libm: Kernel) -> None:
+    """Of 10^9 sub-steps, which would take half a minute, the first 65 536."""
+    hot = Craft(mass=1e-3, inertia=1e-3, air_density=1000.0)
+    for method in ("semi_implicit_euler", "rk4"):
+        outcome, made = libm.advance(State(vx=1e3), Controls(0.0), hot, 1e9, Settings(1.0, METHODS[method]))
+        assert outcome == "not finite"
+        assert math.isnan(made.state.vx)
 
 
 # ---- sine and cosine

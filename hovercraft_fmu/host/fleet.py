@@ -17,7 +17,7 @@ from ..fmu.machine_code import NotCompiledError, fleet_library
 from ..fmu.near_names import explains_keywords
 from ..model.craft import CONSTANT, DERIVED, DIRECTIONAL, Craft, check_parameter
 from ..model.dynamics import Controls, State
-from ..model.integrators import INTEGRATORS, StepTooSmallError
+from ..model.integrators import ADAPTIVE, INTEGRATORS, StepTooSmallError, too_many_tried
 from ..model.subcycling import NonFiniteError, Settings, too_many_substeps
 
 Array: TypeAlias = NDArray[np.float64]
@@ -165,7 +165,8 @@ def advance_fleet(
     way = _put(structure, "numbers", count, way, _WAY)
     found = _Found(count)
     _library().fleet_advance(byref(given.structure), byref(structure), byref(found.structure))
-    return found.fleet(lambda i: given.numbers(i) | _numbers(_WAY, way, i))
+    tries = settings.integrator is ADAPTIVE
+    return found.fleet(lambda i: given.numbers(i) | _numbers(_WAY, way, i), too_many_tried if tries else None)
 
 
 def observe_fleet(states: Rows, controls: Rows, crafts: Crafts | Craft | Sequence[Craft]) -> Array:
@@ -351,19 +352,25 @@ class _Found:
                                    part=self._part.ctypes.data,
                                    **{name: column.ctypes.data for name, column in self._reals.items()})  # fmt: skip
 
-    def fleet(self, numbers: Callable[[int], dict[str, float]]) -> Fleet:
-        """`numbers` gives those of a craft by name."""
-        refused = Refused(np.flatnonzero(self._why), lambda i: self._error(i, numbers(i)))
+    def fleet(
+        self, numbers: Callable[[int], dict[str, float]], tried: Callable[[float, float], ValueError] | None
+    ) -> Fleet:
+        """`numbers` gives those of a craft by name; `tried` says that a method which tries steps found no end."""
+        refused = Refused(np.flatnonzero(self._why), lambda i: self._error(i, numbers(i), tried))
         stability, rotation, proposed = (self._reals[name] for name in ("stability", "rotation", "proposed"))
         return Fleet(self._states, self._substeps, stability, rotation, proposed, refused)
 
-    def _error(self, i: int, numbers: dict[str, float]) -> Exception:
+    def _error(
+        self, i: int, numbers: dict[str, float], tried: Callable[[float, float], ValueError] | None
+    ) -> Exception:
         """What the model would raise."""
         why, substep = self._why[i], self._reals["substep"][i].item()
         if why == RUNAWAY:
             return NonFiniteError(State._fields[self._part[i]], self._reals["value"][i].item(), substep)
         if why == TOO_SMALL:
             return StepTooSmallError(substep, numbers["tolerance"])
+        if why == TOO_MANY and tried:
+            return tried(numbers["communication_step"], numbers["tolerance"])
         if why == TOO_MANY:
             return too_many_substeps(numbers["communication_step"], numbers["step_size"])
         bad, rule = next((name, rule) for name, value in numbers.items() if (rule := _broken_rule(name, value)))

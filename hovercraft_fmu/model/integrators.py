@@ -24,6 +24,12 @@ from .dynamics import (
 
 MIN_STEP = 1e-12
 """s: below it the adaptive method gives up."""
+MAX_TRIED = 10**8
+"""Steps of the adaptive method in one communication step, taken or tried: some seconds of machine code."""
+MAX_TURN = 1.0
+"""rad, in a step of it: a heading that turns on by whole turns between the stages would be taken for one that rests."""
+UNIT = 2.0**-52
+"""Relative: one or two units in the last place of a double."""
 
 
 class Stretch(NamedTuple):
@@ -277,9 +283,9 @@ def splitting(state: State, controls: Controls, craft: Craft, h: float, n: int) 
     shared by the sway of the craft, 1/(m*M) of it, and its yaw rate, x_d/(I*M).
 
     A force from outside, turned into the body frame at the held heading, is a part of T and of the side force, a moment
-    one of the turn. Rotational drag, -d*r*|r|, is r/(1 + h*d*|r|/(2*I)) before and after, which is exact. Friction is an
-    implicit step after all that (and after the half one, so that a craft that it holds stays at rest): that lowers the
-    order to 1.
+    one of the turn. Rotational drag, -d*r*|r|, is r/(1 + h*d*|r|/(2*I)) before and after, which is exact. Friction is
+    an implicit step after all that (and after the half one, so that a craft that it holds stays at rest): that lowers
+    the order to 1.
     """
     drag_at = drag_function(craft)
     rubbed = friction_function(craft, h) if craft.rubs else None
@@ -378,15 +384,27 @@ ERROR = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 
 """Fifth order minus fourth order."""
 
 
+MAX_GROWTH = 5.0
+"""1: of a step over the one before."""
+
+
 class StepTooSmallError(ArithmeticError):
     """The adaptive method cannot meet its tolerance with any step."""
 
     def __init__(self, step: float, tolerance: float) -> None:
         self.step = step
         super().__init__(
-            f"step = {step!r} s: must not fall below {MIN_STEP} s to meet tolerance = {tolerance!r}; "
-            "set a larger tolerance"
+            f"step = {step!r} s: must not fall below {MIN_STEP} s, nor below what a double can tell at its time, to "
+            f"meet tolerance = {tolerance!r}; set a larger tolerance"
         )
+
+
+def too_many_tried(communication_step: float, tolerance: float) -> ValueError:
+    """What the adaptive method raises where it does not come to an end."""
+    return ValueError(
+        f"communication step = {communication_step!r} s: must not need more than 10^8 sub-steps to meet tolerance = "
+        f"{tolerance!r}; set a larger tolerance, or take a shorter step"
+    )
 
 
 def adaptive(
@@ -396,7 +414,8 @@ def adaptive(
 
     A step is taken where its error estimate, the largest of the six components in SI units, is at most the tolerance:
     a fixed scale, which does not depend on where the craft is. The next step is 0.9*(tolerance/error)^(1/4) times as
-    long (at least 1/5, at most 5 times): two square roots, which every platform rounds alike, instead of a fifth root.
+    long (at least 1/5, at most 5 times, not at all right after one that was refused): two square roots, which every
+    platform rounds alike, instead of a fifth root. No step turns the craft by more than 1 rad.
 
     With friction a step is no longer than a quarter of the time in which the craft would come to rest, so that the
     error estimate never looks across that point, nor than the time in which friction takes on the direction of the
@@ -404,6 +423,7 @@ def adaptive(
 
     Raises:
         StepTooSmallError: no step down to 1e-12 s meets the tolerance.
+        ValueError: more than MAX_TRIED steps.
     """
     rates_at = _rate_function(controls, craft)
     reach = _reach_function(craft, tolerance)
@@ -411,28 +431,42 @@ def adaptive(
     drag_rate, spin_rate = craft.drag_rate, craft.spin_rate
     first, kq = rates_at(y)
     time, count, most, fastest = 0.0, 0, 0.0, 0.0
+    tried, growth = 0, MAX_GROWTH
     while time < duration:
         h = min(duration - time, proposed)
         slides, longest = reach(y, first)
         h = min(h, longest) if slides else h
+        if h * abs(y[5]) > 0.9 * MAX_TURN:
+            h = 0.9 * MAX_TURN / abs(y[5])
         last = h >= duration - time
+        if not last and h < max(MIN_STEP, UNIT * time):
+            raise StepTooSmallError(h, tolerance)
+        tried += 1
+        if tried > MAX_TRIED:
+            raise too_many_tried(duration, tolerance)
         try:
             new, rates, error = (
                 _dormand_prince(y, first, h, rates_at) if slides else _near_rest(y, controls, craft, h, rates_at)
             )
+            turn = abs(new[2] - y[2])
         except (ValueError, OverflowError):  # what math.sin says of an infinite angle
-            error = math.inf
-        if not error <= tolerance:
-            proposed = h * max(0.2, 0.9 * math.sqrt(math.sqrt(tolerance / error))) if error < math.inf else 0.2 * h
+            error = turn = math.inf
+        if not (error <= tolerance and turn <= MAX_TURN):
+            if error <= tolerance:
+                proposed = h * max(0.2, 0.9 * MAX_TURN / turn)
+            else:
+                proposed = h * max(0.2, 0.9 * math.sqrt(math.sqrt(tolerance / error))) if error < math.inf else 0.2 * h
             if proposed < MIN_STEP:
                 raise StepTooSmallError(proposed, tolerance)
+            growth = 1.0
             continue
         most, fastest = max(most, h * (kq * drag_rate + abs(y[5]) * spin_rate)), max(fastest, h * abs(y[5]))
         time = duration if last else time + h
         y, (first, kq), count = new, rates, count + 1
         most, fastest = max(most, h * (kq * drag_rate + abs(y[5]) * spin_rate)), max(fastest, h * abs(y[5]))
         if not last:  # a step cut short by the end says nothing against the one proposed
-            proposed = h * min(5.0, 0.9 * math.sqrt(math.sqrt(tolerance / error)) if error else 5.0)
+            proposed = h * min(growth, 0.9 * math.sqrt(math.sqrt(tolerance / error)) if error else growth)
+        growth = MAX_GROWTH
     return Stretch(State(*y), count, most, fastest, proposed)
 
 

@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 from .craft import Craft
 from .dynamics import Controls, State
-from .integrators import INTEGRATORS, Integrator, Stretch, adaptive
+from .integrators import INTEGRATORS, UNIT, Integrate, Integrator, Stretch, adaptive
 
 MAX_SUBSTEPS = 10**9
 """Of one communication step: half an hour of computing, or a slip of the decimal point."""
-UNIT = 2.0**-52
-"""Relative: one or two units in the last place of a double."""
+PIECE = 1 << 16
+"""Sub-steps after which it is seen whether the motion is still finite: what is not ends then."""
 
 
 class Settings(NamedTuple):
@@ -138,7 +138,7 @@ def advance(
     A step of 0 changes no bit. `proposed` is what the last step of the adaptive method returned; 0 at the start.
 
     Raises:
-        ValueError: see `substeps`.
+        ValueError: see `substeps`; the adaptive method needs more than 10^8 of them.
         NonFiniteError: the motion left the range of numbers.
         StepTooSmallError: the adaptive method cannot meet its tolerance.
     """
@@ -149,12 +149,21 @@ def advance(
         check_communication_step(communication_step)
         return adaptive(state, controls, craft, communication_step, settings.tolerance, proposed or settings.step_size)
     n, h = substeps(communication_step, settings.step_size)
+    stretch = _made(method, state, controls, craft, h, min(n, PIECE))
+    while stretch.substeps < n:
+        further = _made(method, stretch.state, controls, craft, h, min(n - stretch.substeps, PIECE))
+        stability, rotation = max(stretch.stability, further.stability), max(stretch.rotation, further.rotation)
+        stretch = Stretch(further.state, stretch.substeps + further.substeps, stability, rotation)
+    return stretch
+
+
+def _made(method: Integrate, state: State, controls: Controls, craft: Craft, h: float, n: int) -> Stretch:
     try:
         stretch = method(state, controls, craft, h, n)
     except (ValueError, OverflowError):  # what math.sin says of an infinite angle
         stretch = Stretch(State(*[math.nan] * 6), n, 0.0, 0.0)
     if not math.isfinite(sum(stretch.state)):
-        _refuse_non_finite(stretch.state, h)
+        _refuse_non_finite(State(*[math.nan] * 6) if math.isinf(stretch.state.heading) else stretch.state, h)
     return stretch
 
 

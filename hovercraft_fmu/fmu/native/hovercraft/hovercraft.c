@@ -208,13 +208,19 @@ static enum verdict refuse_step(struct instance *instance, enum outcome outcome,
                                 const struct stretch *stretch)
 {
     const struct settings *settings = &instance->now.model.settings;
+    if (outcome == TOO_MANY_SUBSTEPS && settings->integrator == ADAPTIVE)
+        return instance_say(instance, DISCARDED,
+                            "communication step = %r s: must not need more than 10^8 sub-steps to meet tolerance = %r; "
+                            "set a larger tolerance, or take a shorter step",
+                            step, settings->tolerance);
     if (outcome == TOO_MANY_SUBSTEPS)
         return instance_say(instance, DISCARDED,
                             "communication step = %r s: must not need more than 10^9 sub-steps of step_size = %r s",
                             step, settings->step_size);
     if (outcome == STEP_TOO_SMALL)
         return instance_say(instance, DISCARDED,
-                            "step = %r s: must not fall below 1e-12 s to meet tolerance = %r; set a larger tolerance",
+                            "step = %r s: must not fall below 1e-12 s, nor below what a double can tell at its time, to meet "
+                            "tolerance = %r; set a larger tolerance",
                             stretch->substep, settings->tolerance);
     return refuse_motion(instance, stretch);
 }

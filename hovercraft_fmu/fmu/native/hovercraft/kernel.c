@@ -8,6 +8,8 @@
 
 static const double MIN_STEP = 1e-12;     /* s: below it the adaptive method gives up */
 static const double MAX_SUBSTEPS = 1e9;   /* of one communication step */
+static const double MAX_TURN = 1.0;       /* rad, in a step of the adaptive method */
+static const double MAX_GROWTH = 5.0;     /* of such a step over the one before */
 static const double NEAR_REST = 4.0;      /* sub-steps in which friction could stop the craft */
 static const double MOST = 1e100;         /* h times a rate of drag is taken as no more by splitting */
 static const double LEAST_SLIP = 1e-150;  /* m/s: so that at rest nothing is divided by zero */
@@ -16,6 +18,11 @@ static const double TIGHTER = 32.0;       /* the adaptive companion's tolerance 
 static const double NOT_SMALL = 0.25;     /* of the way: an error above it is lost */
 static const int FEW = 20;                /* sub-steps: before so many even a small error is not small beside the way */
 static const double TO_INTEGER = 0x1p+52; /* adding and subtracting it rounds what is smaller, ties to even */
+
+/* Steps of the adaptive method in one communication step, taken or tried. (A test has not the time for so many.) */
+#ifndef HOVERCRAFT_MAX_TRIED
+#define HOVERCRAFT_MAX_TRIED 100000000
+#endif
 
 /* With HOVERCRAFT_LIBM the platform's functions, which Python uses, too. */
 #ifdef HOVERCRAFT_LIBM
@@ -453,6 +460,8 @@ void kernel_body_velocity(const struct state *state, double *surge, double *sway
 
 /* ---- integrators.py */
 
+enum { PIECE = 1 << 16 }; /* sub-steps after which it is seen whether the motion is still finite */
+
 /* What is watched over a stretch. */
 struct watch {
     double most;        /* 1/s: the fastest drag; of plain drag the largest k*q [kg/s], which is times one constant */
@@ -497,6 +506,18 @@ static struct stretch stretch_of(struct load_function *f, const struct state *s,
     return watched_stretch(f, s, n, h, watch);
 }
 
+static bool is_finite(const struct state *s)
+{
+    return isfinite(s->x) && isfinite(s->y) && isfinite(s->heading) && isfinite(s->vx) && isfinite(s->vy) &&
+           isfinite(s->yaw_rate);
+}
+
+/* Of a motion that has left the range of numbers nothing more is worked out. */
+static ALWAYS_INLINE bool is_over(const struct state *s, int64_t done)
+{
+    return (done & (PIECE - 1)) == 0 && !is_finite(s);
+}
+
 static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, unsigned beside, const struct state *state,
                                              struct load_function *f, double h, int64_t n)
 {
@@ -516,6 +537,8 @@ static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, unsigned besid
         s.y = s.y + h * s.vy;
         s.heading = s.heading + h * s.yaw_rate;
         watch_yaw_rate(&watch, s.yaw_rate);
+        if (is_over(&s, i + 1))
+            break;
     }
     return stretch_of(f, &s, n, h, &watch);
 }
@@ -593,6 +616,8 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
         z.y = z.y + h * z.vy;
         z.heading = z.heading + h * z.yaw_rate;
         watch_yaw_rate(&watch, z.yaw_rate);
+        if (is_over(&z, i + 1))
+            break;
     }
     return stretch_of(f, &z, n, h, &watch);
 }
@@ -633,6 +658,8 @@ static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, unsigned beside,
         watch_yaw_rate(&watch, r3);
         watch_yaw_rate(&watch, r4);
         watch_yaw_rate(&watch, s.yaw_rate);
+        if (is_over(&s, i + 1))
+            break;
     }
     return stretch_of(f, &s, n, h, &watch);
 }
@@ -660,6 +687,8 @@ static struct stretch rk4_with_friction(const struct state *state, const struct 
         whole.state = one.state;
         whole.stability = larger(whole.stability, one.stability);
         whole.rotation = larger(whole.rotation, one.rotation);
+        if (is_over(&whole.state, i + 1))
+            break;
     }
     return whole;
 }
@@ -763,6 +792,8 @@ static ALWAYS_INLINE struct stretch splitting_as(enum drag_kind kind, unsigned b
         z.heading = z.heading + half * z.yaw_rate;
         watch_loads(&watch, f, kind, then > kq ? then : kq, larger(begun, fabs(z.yaw_rate)));
         watch_yaw_rate(&watch, z.yaw_rate);
+        if (is_over(&z, i + 1))
+            break;
     }
     return watched_stretch(f, &z, n, h, &watch);
 }
@@ -883,6 +914,20 @@ static double near_rest(struct load_function *f, double time, const double y[COM
     return isfinite(error) && !isinf(after.heading) ? error : INFINITY;
 }
 
+/* s: where in the communication step the next ramp of an input meets a limit, or its end. */
+static double next_bend(const struct drive *drive, const struct craft *craft, double time, double end)
+{
+    const double starts[] = {drive->start.thrust, drive->start.port, drive->start.starboard};
+    const double rates[] = {drive->rate.thrust, drive->rate.port, drive->rate.starboard};
+    const double limits[][2] = {{craft->thrust_min, craft->thrust_max}, {0.0, 1.0}, {0.0, 1.0}};
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; rates[i] != 0.0 && k < 2; k++) {
+            const double met = (limits[i][k] - starts[i]) / rates[i];
+            end = time < met && met < end ? met : end;
+        }
+    return end;
+}
+
 static enum outcome adaptive(const struct state *state, const struct drive *drive, const struct craft *craft,
                              double duration, double tolerance, double proposed, struct stretch *stretch)
 {
@@ -892,20 +937,36 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
     const struct friction friction = friction_function(craft, 1.0);
     double y[COMPONENTS];
     double time = 0.0, most = 0.0, fastest = 0.0;
-    int64_t count = 0;
+    double growth = MAX_GROWTH;
+    int64_t count = 0, tried = 0;
     struct rates stages[STAGES];
     components_of(state, y);
     stages[0] = rates_at(&f, y);
     while (time < duration) {
-        double new[COMPONENTS], longest, h = smaller(duration - time, proposed);
+        const double end = next_bend(drive, craft, time, duration);
+        double new[COMPONENTS], longest, h = smaller(end - time, proposed);
         const bool slides = can_slide(&f, y, &stages[0], &friction, tolerance, &longest);
         if (slides)
             h = smaller(h, longest);
-        const bool last = h >= duration - time;
+        if (h * fabs(y[YAW_RATE]) > 0.9 * MAX_TURN)
+            h = 0.9 * MAX_TURN / fabs(y[YAW_RATE]);
+        const bool last = h >= end - time;
+        if (!last && h < larger(MIN_STEP, UNIT * time)) {
+            stretch->substep = h;
+            return STEP_TOO_SMALL;
+        }
+        if (++tried > HOVERCRAFT_MAX_TRIED)
+            return TOO_MANY_SUBSTEPS;
         const double error = slides ? dormand_prince(&f, time, y, h, stages, new)
                                     : near_rest(&f, time, y, h, &stages[STAGES - 1], new);
-        if (!(error <= tolerance)) {
-            proposed = error < INFINITY ? h * larger(0.2, 0.9 * square_root(square_root(tolerance / error))) : 0.2 * h;
+        const double turn = fabs(new[HEADING] - y[HEADING]);
+        if (!(error <= tolerance && turn <= MAX_TURN)) {
+            if (error <= tolerance)
+                proposed = h * larger(0.2, 0.9 * MAX_TURN / turn);
+            else
+                proposed =
+                    error < INFINITY ? h * larger(0.2, 0.9 * square_root(square_root(tolerance / error))) : 0.2 * h;
+            growth = 1.0;
             if (proposed < MIN_STEP) {
                 stretch->substep = proposed;
                 return STEP_TOO_SMALL;
@@ -914,15 +975,16 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
         }
         most = larger(most, h * fastest_rate(&f, stages[0].kq, y[YAW_RATE]));
         fastest = larger(fastest, h * fabs(y[YAW_RATE]));
-        time = last ? duration : time + h;
+        time = last ? end : time + h;
         for (int i = 0; i < COMPONENTS; i++)
             y[i] = new[i];
         stages[0] = stages[STAGES - 1];
         count++;
         most = larger(most, h * fastest_rate(&f, stages[0].kq, y[YAW_RATE]));
         fastest = larger(fastest, h * fabs(y[YAW_RATE]));
-        if (!last) /* a step cut short by the end says nothing against the one proposed */
-            proposed = h * smaller(5.0, error > 0.0 ? 0.9 * square_root(square_root(tolerance / error)) : 5.0);
+        if (!last) /* a step cut short by the end, or a bend, says nothing against the one proposed */
+            proposed = h * smaller(growth, error > 0.0 ? 0.9 * square_root(square_root(tolerance / error)) : growth);
+        growth = MAX_GROWTH;
     }
     *stretch = (struct stretch){
         .state = state_of(y),
@@ -969,12 +1031,6 @@ static bool substeps(double communication_step, double step_size, int64_t *n, do
     }
     *n = (int64_t)whole;
     return whole <= MAX_SUBSTEPS;
-}
-
-static bool is_finite(const struct state *s)
-{
-    return isfinite(s->x) && isfinite(s->y) && isfinite(s->heading) && isfinite(s->vx) && isfinite(s->vy) &&
-           isfinite(s->yaw_rate);
 }
 
 /* Of a fixed step. */
