@@ -82,7 +82,7 @@ def opened(window: tuple[Page, list[str]], file: Path) -> Iterator[Opened]:
         made.set_viewport_size({"width": size[0], "height": size[1]})
         made.emulate_media(**{"color_scheme": "light", "reduced_motion": "no-preference", **media})
         made.goto(f"{path.as_uri()}#{fragment}")
-        expect(made.locator("#sorry")).to_be_hidden()
+        made.wait_for_function("globalThis.hovercraft")
         return made
 
     yield open_page

@@ -20,13 +20,15 @@ export class Chart {
   /** @param {number} distance @param {number} estimate */
   add(distance, estimate) {
     this.samples.push([distance, estimate]);
-    if (this.samples.length > SAMPLES)
-      this.samples.shift();
+    if (this.samples.length > SAMPLES) this.samples.shift();
   }
 
   draw() {
-    const ratio = Math.min(window.devicePixelRatio || 1, 2), { context: c, element } = this;
-    const width = element.clientWidth, height = element.clientHeight, style = getComputedStyle(element);
+    const ratio = Math.min(window.devicePixelRatio || 1, 2),
+      { context: c, element } = this;
+    const width = element.clientWidth,
+      height = element.clientHeight,
+      style = getComputedStyle(element);
     if (element.width !== Math.round(width * ratio) || element.height !== Math.round(height * ratio)) {
       element.width = Math.round(width * ratio);
       element.height = Math.round(height * ratio);

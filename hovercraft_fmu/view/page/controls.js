@@ -16,7 +16,14 @@ import { HELM, SCALES, STEP_SIZES, TOLERANCES, sceneOf } from "./settings.js";
 
 /** @type {Record<string, string>} */
 const HELD = {
-  ArrowUp: "up", KeyW: "up", ArrowDown: "down", KeyS: "down", ArrowLeft: "left", KeyA: "left", ArrowRight: "right", KeyD: "right",
+  ArrowUp: "up",
+  KeyW: "up",
+  ArrowDown: "down",
+  KeyS: "down",
+  ArrowLeft: "left",
+  KeyA: "left",
+  ArrowRight: "right",
+  KeyD: "right",
 };
 const MOVED_BY_KEYS = "input, select, textarea";
 
@@ -33,8 +40,7 @@ export function field(id) {
 /** Write, where it is not there already. @param {string} id @param {string} text */
 export function write(id, text) {
   const at = element(id);
-  if (at.textContent !== text)
-    at.textContent = text;
+  if (at.textContent !== text) at.textContent = text;
 }
 
 export class Controls {
@@ -62,10 +68,8 @@ export class Controls {
     const down = new Set();
     addEventListener("keydown", (event) => {
       const at = /** @type {HTMLElement} */ (event.target);
-      if (event.ctrlKey || event.metaKey || event.altKey)
-        return;
-      if (event.key === "Escape")
-        at.blur();
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.key === "Escape") at.blur();
       else if (!at.matches?.(MOVED_BY_KEYS) && !(event.code === "Space" && at.matches?.("button, summary")))
         this.press(event, down);
     });
@@ -81,22 +85,22 @@ export class Controls {
 
   /** @param {KeyboardEvent} event @param {Set<string>} down */
   press(event, down) {
-    const held = HELD[event.code], once = this.keys()[event.key.toLowerCase()];
-    if (!held && !once)
-      return;
+    const held = HELD[event.code],
+      once = this.keys()[event.key.toLowerCase()];
+    if (!held && !once) return;
     event.preventDefault();
-    if (event.repeat && (held || event.key === " "))
-      return;
+    if (event.repeat && (held || event.key === " ")) return;
     if (held) {
       down.add(event.code);
       this.actions.act(held, 1);
-    } else
-      once();
+    } else once();
   }
 
   /** @returns {Record<string, () => void>} */
   keys() {
-    const { actions } = this, settings = this.settings(), methods = Object.keys(this.data.methods);
+    const { actions } = this,
+      settings = this.settings(),
+      methods = Object.keys(this.data.methods);
     const along = (/** @type {any[]} */ list, /** @type {any} */ now, /** @type {number} */ by) =>
       list[Math.min(Math.max(list.indexOf(now) + by, 0), list.length - 1)];
     const scale = (/** @type {number} */ by) => actions.change({ scale: along(SCALES, settings.scale, by) });
@@ -143,34 +147,45 @@ export class Controls {
     options("scene", ["", ...data.scenes.map((each) => each.name)], (name) => (name ? `scene: ${name}` : "you"));
     options("integrator", Object.keys(data.methods), (name) => name.replaceAll("_", " "));
     options("scale", SCALES.map(String), (scale) => `× ${scale}`);
-    element("terms").append(...data.terms.map((term) => {
-      const label = document.createElement("label"), box = document.createElement("input"), price = document.createElement("output");
-      box.type = "checkbox";
-      box.id = `term-${term.name}`;
-      price.id = `price-${term.name}`;
-      label.title = Object.entries(term.values).map(([name, value]) => `${name} = ${value}: ${this.description.variable(name).description}`).join("\n");
-      label.append(box, term.label, price);
-      box.addEventListener("change", () => this.changeTerm(term.name, box.checked));
-      return label;
-    }));
-    element("inputs").append(...this.description.inputs.filter((each) => !HELM.includes(each.name)).map((input) => {
-      const label = document.createElement("label"), number = document.createElement("input");
-      number.type = "number";
-      number.step = String(input.nominal);
-      number.id = `input-${input.name}`;
-      label.title = input.description;
-      label.append(`${input.name}, ${input.unit}`, number);
-      number.addEventListener("change", () => {
-        if (Number.isFinite(number.valueAsNumber))
-          this.actions.act(input.name, number.valueAsNumber);
-      });
-      return label;
-    }));
+    element("terms").append(
+      ...data.terms.map((term) => {
+        const label = document.createElement("label"),
+          box = document.createElement("input"),
+          price = document.createElement("output");
+        box.type = "checkbox";
+        box.id = `term-${term.name}`;
+        price.id = `price-${term.name}`;
+        label.title = Object.entries(term.values)
+          .map(([name, value]) => `${name} = ${value}: ${this.description.variable(name).description}`)
+          .join("\n");
+        label.append(box, term.label, price);
+        box.addEventListener("change", () => this.changeTerm(term.name, box.checked));
+        return label;
+      }),
+    );
+    element("inputs").append(
+      ...this.description.inputs
+        .filter((each) => !HELM.includes(each.name))
+        .map((input) => {
+          const label = document.createElement("label"),
+            number = document.createElement("input");
+          number.type = "number";
+          number.step = String(input.nominal);
+          number.id = `input-${input.name}`;
+          label.title = input.description;
+          label.append(`${input.name}, ${input.unit}`, number);
+          number.addEventListener("change", () => {
+            if (Number.isFinite(number.valueAsNumber)) this.actions.act(input.name, number.valueAsNumber);
+          });
+          return label;
+        }),
+    );
   }
 
   listenToFields() {
     const { actions } = this;
-    const click = (/** @type {string} */ id, /** @type {() => void} */ action) => element(id).addEventListener("click", action);
+    const click = (/** @type {string} */ id, /** @type {() => void} */ action) =>
+      element(id).addEventListener("click", action);
     click("pause", actions.pause);
     click("step", actions.stepOnce);
     click("reset", actions.reset);
@@ -178,21 +193,26 @@ export class Controls {
     click("save", actions.save);
     click("copy-command", () => copy("copy-command", field("command").value));
     click("copy-link", () => copy("copy-link", location.href));
-    click("unstable", () => actions.change({ scene: "turn", integrator: "semi_implicit_euler", step_size: 2, scale: 5 }));
+    click("unstable", () =>
+      actions.change({ scene: "turn", integrator: "semi_implicit_euler", step_size: 2, scale: 5 }),
+    );
     for (const name of ["preset", "scene", "integrator"])
       element(name).addEventListener("change", () => actions.change({ [name]: field(name).value }));
-    element("view-kind").addEventListener("change", () => actions.change({ view: /** @type {"open"} */ (field("view-kind").value) }));
+    element("view-kind").addEventListener("change", () =>
+      actions.change({ view: /** @type {"open"} */ (field("view-kind").value) }),
+    );
     element("scale").addEventListener("change", () => actions.change({ scale: Number(field("scale").value) }));
     element("estimate").addEventListener("change", () => actions.change({ estimate: field("estimate").checked }));
-    element("fineness").addEventListener("input", () => this.changeFineness(this.fineness()[field("fineness").valueAsNumber]));
+    element("fineness").addEventListener("input", () =>
+      this.changeFineness(this.fineness()[field("fineness").valueAsNumber]),
+    );
     // who chose with a pointer goes on with the keys of the craft
     let pointed = false;
     addEventListener("pointerdown", () => (pointed = true), true);
     addEventListener("keydown", () => (pointed = false), true);
     element("panel").addEventListener("change", (event) => {
       const at = /** @type {HTMLInputElement} */ (event.target);
-      if (pointed && at.type !== "number")
-        at.blur();
+      if (pointed && at.type !== "number") at.blur();
     });
     element("panel").addEventListener("click", (event) => {
       if (pointed && /** @type {HTMLElement} */ (event.target).matches("button"))
@@ -202,9 +222,9 @@ export class Controls {
 
   /** @param {string} name @param {boolean} on */
   changeTerm(name, on) {
-    const settings = this.settings(), term = this.data.terms.find((each) => each.name === name);
-    if (term?.input)
-      Object.entries(term.values).forEach(([input, value]) => this.actions.act(input, on ? value : 0));
+    const settings = this.settings(),
+      term = this.data.terms.find((each) => each.name === name);
+    if (term?.input) Object.entries(term.values).forEach(([input, value]) => this.actions.act(input, on ? value : 0));
     else
       this.actions.change({ terms: on ? [...settings.terms, name] : settings.terms.filter((each) => each !== name) });
   }
@@ -226,10 +246,17 @@ export class Controls {
 
   /** The fields say what is set. */
   show() {
-    const { data } = this, settings = this.settings(), adaptive = settings.integrator === "adaptive", scene = sceneOf(settings, data);
-    const values = { preset: scene?.preset ?? settings.preset, scene: settings.scene, integrator: settings.integrator, scale: String(settings.scale) };
-    for (const [name, value] of Object.entries({ ...values, "view-kind": settings.view }))
-      field(name).value = value;
+    const { data } = this,
+      settings = this.settings(),
+      adaptive = settings.integrator === "adaptive",
+      scene = sceneOf(settings, data);
+    const values = {
+      preset: scene?.preset ?? settings.preset,
+      scene: settings.scene,
+      integrator: settings.integrator,
+      scale: String(settings.scale),
+    };
+    for (const [name, value] of Object.entries({ ...values, "view-kind": settings.view })) field(name).value = value;
     field("preset").disabled = Boolean(scene);
     field("estimate").checked = settings.estimate;
     field("fineness").max = String(this.fineness().length - 1);
@@ -242,14 +269,15 @@ export class Controls {
     write("method-text", data.methods[settings.integrator].text);
     for (const term of data.terms) {
       const { inputs } = settings;
-      field(`term-${term.name}`).checked = term.input ? Object.keys(term.values).some((name) => inputs[name]) : settings.terms.includes(term.name);
+      field(`term-${term.name}`).checked = term.input
+        ? Object.keys(term.values).some((name) => inputs[name])
+        : settings.terms.includes(term.name);
       field(`term-${term.name}`).disabled = Boolean(scene);
     }
     for (const { name } of this.description.inputs.filter((each) => !HELM.includes(each.name))) {
       const number = field(`input-${name}`);
       number.disabled = Boolean(scene);
-      if (document.activeElement !== number)
-        number.value = String(settings.inputs[name] ?? 0);
+      if (document.activeElement !== number) number.value = String(settings.inputs[name] ?? 0);
     }
   }
 }
@@ -261,7 +289,11 @@ function options(id, values, words = (/** @type {string} */ value) => value) {
 
 /** A time in its best unit. @param {number} time s */
 export function seconds(time) {
-  return time < 1e-3 ? `${Number((time * 1e6).toPrecision(3))} µs` : time < 1 ? `${Number((time * 1e3).toPrecision(3))} ms` : `${time} s`;
+  return time < 1e-3
+    ? `${Number((time * 1e6).toPrecision(3))} µs`
+    : time < 1
+      ? `${Number((time * 1e3).toPrecision(3))} ms`
+      : `${time} s`;
 }
 
 /** @param {string} id of the button @param {string} text */

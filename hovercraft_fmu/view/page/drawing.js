@@ -35,11 +35,9 @@ class Track {
   /** @param {Pose} pose */
   pass(pose) {
     const last = this.points[this.points.length - 1];
-    if (last && Math.hypot(pose.x - last.x, pose.y - last.y) < this.spacing)
-      return;
+    if (last && Math.hypot(pose.x - last.x, pose.y - last.y) < this.spacing) return;
     this.points.push(pose);
-    if (this.points.length > this.most)
-      this.points.shift();
+    if (this.points.length > this.most) this.points.shift();
   }
 }
 
@@ -55,14 +53,12 @@ export class Picture {
   }
 
   clear() {
-    for (const each of [this.wake, this.track, this.ghostTrack])
-      each.points = [];
+    for (const each of [this.wake, this.track, this.ghostTrack]) each.points = [];
   }
 
   /** The colours and sizes, which a change of theme or window changes. */
   measure() {
-    for (const each of [this.view, this.map, this.compass])
-      each.measure();
+    for (const each of [this.view, this.map, this.compass]) each.measure();
   }
 
   /** @param {Shown} shown */
@@ -77,10 +73,8 @@ export class Picture {
     const camera = new Camera(this.view, shown);
     this.drawSea(camera);
     this.drawTrack(camera, this.ghostTrack, "ghost");
-    if (!shown.still)
-      this.drawWake(camera, shown);
-    else
-      this.drawTrack(camera, this.track, "wake");
+    if (!shown.still) this.drawWake(camera, shown);
+    else this.drawTrack(camera, this.track, "wake");
     this.drawGates(camera, shown);
     this.drawGhost(camera, shown);
     this.drawCraft(camera, shown);
@@ -96,17 +90,17 @@ export class Picture {
     c.strokeStyle = colors.grid;
     c.lineWidth = 1;
     c.beginPath();
-    const [x, y] = camera.place({ x: 0, y: 0 }), spacing = GRID * camera.scale;
-    for (let at = ((x % spacing) + spacing) % spacing; at < width; at += spacing)
-      line(c, [at, 0], [at, height]);
-    for (let at = ((y % spacing) + spacing) % spacing; at < height; at += spacing)
-      line(c, [0, at], [width, at]);
+    const [x, y] = camera.place({ x: 0, y: 0 }),
+      spacing = GRID * camera.scale;
+    for (let at = ((x % spacing) + spacing) % spacing; at < width; at += spacing) line(c, [at, 0], [at, height]);
+    for (let at = ((y % spacing) + spacing) % spacing; at < height; at += spacing) line(c, [0, at], [width, at]);
     c.stroke();
   }
 
   /** A band that widens and fades. @param {Camera} camera @param {Shown} shown */
   drawWake(camera, shown) {
-    const { context: c, colors } = this.view, points = [...this.wake.points, shown.craft];
+    const { context: c, colors } = this.view,
+      points = [...this.wake.points, shown.craft];
     c.fillStyle = colors.wake;
     for (let i = 1; i < points.length; i++) {
       const age = (points.length - i) / WAKE_POINTS;
@@ -114,7 +108,10 @@ export class Picture {
       const ends = [points[i - 1], points[i]].map((each, k) => {
         const half = shown.size.width * (0.28 + 0.5 * (age + (1 - k) / WAKE_POINTS));
         const [x, y] = [each.x - points[i].x, each.y - points[i].y];
-        return [-1, 1].map((side) => [x - side * half * Math.sin(each.heading), y + side * half * Math.cos(each.heading)]);
+        return [-1, 1].map((side) => [
+          x - side * half * Math.sin(each.heading),
+          y + side * half * Math.cos(each.heading),
+        ]);
       });
       camera.fill([ends[0][0], ends[1][0], ends[1][1], ends[0][1]], points[i]);
     }
@@ -128,8 +125,7 @@ export class Picture {
     c.lineWidth = 1.5;
     c.globalAlpha = 0.5;
     c.beginPath();
-    for (let i = 1; i < track.points.length; i++)
-      camera.line(track.points[i - 1], track.points[i]);
+    for (let i = 1; i < track.points.length; i++) camera.line(track.points[i - 1], track.points[i]);
     c.stroke();
     c.globalAlpha = 1;
   }
@@ -158,11 +154,16 @@ export class Picture {
     c.setLineDash([]);
   }
 
-  /** Port is red and starboard green, as at sea; the next gate is bright. @param {Camera} camera @param {Shown} shown */
+  /**
+   * Port is red and starboard green, as at sea; the next gate is bright.
+   * @param {Camera} camera
+   * @param {Shown} shown
+   */
   drawGates(camera, shown) {
     const { context: c, colors } = this.view;
     shown.course?.gates.forEach((gate, i) => {
-      const is_next = i === shown.course?.next, passed = i < (shown.course?.next ?? 0);
+      const is_next = i === shown.course?.next,
+        passed = i < (shown.course?.next ?? 0);
       const [port, starboard] = posts(gate).map((post) => camera.place(post));
       c.globalAlpha = passed ? 0.25 : 1;
       c.strokeStyle = is_next ? colors.accent : colors.faint;
@@ -172,24 +173,31 @@ export class Picture {
       line(c, port, starboard);
       c.stroke();
       c.setLineDash([]);
-      for (const [post, color] of /** @type {[Point, string][]} */ ([[port, colors.port], [starboard, colors.starboard]]))
+      for (const [post, color] of /** @type {[Point, string][]} */ ([
+        [port, colors.port],
+        [starboard, colors.starboard],
+      ]))
         dot(c, post, 7, color);
       c.fillStyle = is_next ? colors.accent : colors.faint;
       c.font = "600 14px system-ui, sans-serif";
       c.fillText(String(i + 1), starboard[0] + 12, starboard[1] + 5);
       c.globalAlpha = 1;
-      if (is_next)
-        this.point(camera, shown.craft, gate);
+      if (is_next) this.point(camera, shown.craft, gate);
     });
   }
 
-  /** An arrow around the craft toward what is out of sight. @param {Camera} camera @param {Pose} craft @param {Pose} gate */
+  /**
+   * An arrow around the craft toward what is out of sight.
+   * @param {Camera} camera
+   * @param {Pose} craft
+   * @param {Pose} gate
+   */
   point(camera, craft, gate) {
     const { context: c, width, height, colors } = this.view;
     const [x, y] = camera.place(gate);
-    if (x > 0 && x < width && y > 0 && y < height)
-      return;
-    const [fromX, fromY] = camera.place(craft), angle = Math.atan2(y - fromY, x - fromX);
+    if (x > 0 && x < width && y > 0 && y < height) return;
+    const [fromX, fromY] = camera.place(craft),
+      angle = Math.atan2(y - fromY, x - fromX);
     const reach = Math.min(width, height) * 0.3;
     const tip = /** @type {Point} */ ([fromX + reach * Math.cos(angle), fromY + reach * Math.sin(angle)]);
     arrow(c, tip, angle, 14, colors.accent);
@@ -206,14 +214,22 @@ export class Picture {
     const { context: c, width, height, colors } = this.map;
     c.clearRect(0, 0, width, height);
     const gates = shown.course?.gates ?? [];
-    const all = [...this.track.points, ...gates, shown.craft, shown.ghost].filter((each) => Number.isFinite(each.x + each.y));
-    const xs = all.map((each) => each.x), ys = all.map((each) => each.y);
+    const all = [...this.track.points, ...gates, shown.craft, shown.ghost].filter((each) =>
+      Number.isFinite(each.x + each.y),
+    );
+    const xs = all.map((each) => each.x),
+      ys = all.map((each) => each.y);
     const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const scale = Math.min((width - 24) / Math.max(right - left, 200), (height - 24) / Math.max(bottom - top, 120));
-    const place = (/** @type {{x: number, y: number}} */ at) => /** @type {Point} */ ([
-      width / 2 + scale * (at.x - (left + right) / 2), height / 2 + scale * (at.y - (top + bottom) / 2),
-    ]);
-    for (const [track, color] of /** @type {[Track, string][]} */ ([[this.ghostTrack, colors.ghost], [this.track, colors.wake]])) {
+    const place = (/** @type {{x: number, y: number}} */ at) =>
+      /** @type {Point} */ ([
+        width / 2 + scale * (at.x - (left + right) / 2),
+        height / 2 + scale * (at.y - (top + bottom) / 2),
+      ]);
+    for (const [track, color] of /** @type {[Track, string][]} */ ([
+      [this.ghostTrack, colors.ghost],
+      [this.track, colors.wake],
+    ])) {
       c.strokeStyle = color;
       c.lineWidth = 1.5;
       c.beginPath();
@@ -228,7 +244,10 @@ export class Picture {
       c.stroke();
     });
     if (!shown.wraps) {
-      const [x, y] = place({ x: camera.x - this.view.width / 2 / camera.scale, y: camera.y - this.view.height / 2 / camera.scale });
+      const [x, y] = place({
+        x: camera.x - this.view.width / 2 / camera.scale,
+        y: camera.y - this.view.height / 2 / camera.scale,
+      });
       c.strokeStyle = colors.faint;
       c.lineWidth = 1;
       c.strokeRect(x, y, (scale * this.view.width) / camera.scale, (scale * this.view.height) / camera.scale);
@@ -239,11 +258,11 @@ export class Picture {
 
   /** Heading, course over ground, wind. @param {Shown} shown */
   drawCompass(shown) {
-    const { context: c, width, height, colors } = this.compass, radius = Math.min(width, height) / 2 - 3;
+    const { context: c, width, height, colors } = this.compass,
+      radius = Math.min(width, height) / 2 - 3;
     const center = /** @type {Point} */ ([width / 2, height / 2]);
-    const at = (/** @type {number} */ angle, /** @type {number} */ reach) => /** @type {Point} */ ([
-      center[0] + reach * Math.cos(angle), center[1] + reach * Math.sin(angle),
-    ]);
+    const at = (/** @type {number} */ angle, /** @type {number} */ reach) =>
+      /** @type {Point} */ ([center[0] + reach * Math.cos(angle), center[1] + reach * Math.sin(angle)]);
     c.clearRect(0, 0, width, height);
     c.strokeStyle = colors.faint;
     c.lineWidth = 1.5;
@@ -259,7 +278,12 @@ export class Picture {
     c.fillStyle = colors.hull;
     c.strokeStyle = colors.edge;
     c.beginPath();
-    for (const [angle, reach] of [[0, 0.72], [2.5, 0.5], [Math.PI, 0.26], [-2.5, 0.5]])
+    for (const [angle, reach] of [
+      [0, 0.72],
+      [2.5, 0.5],
+      [Math.PI, 0.26],
+      [-2.5, 0.5],
+    ])
       c.lineTo(...at(heading + angle, radius * reach));
     c.closePath();
     c.fill();
@@ -280,7 +304,8 @@ class Canvas {
   }
 
   measure() {
-    const ratio = Math.min(window.devicePixelRatio || 1, 2), style = getComputedStyle(this.element);
+    const ratio = Math.min(window.devicePixelRatio || 1, 2),
+      style = getComputedStyle(this.element);
     this.width = this.element.clientWidth;
     this.height = this.element.clientHeight;
     this.element.width = Math.round(this.width * ratio);
@@ -305,14 +330,21 @@ export class Camera {
   /** @param {{ x: number, y: number }} point @returns {Point} */
   place(point) {
     const { width, height } = this.canvas;
-    const x = width / 2 + this.scale * (point.x - this.x), y = height / 2 + this.scale * (point.y - this.y);
+    const x = width / 2 + this.scale * (point.x - this.x),
+      y = height / 2 + this.scale * (point.y - this.y);
     return this.wraps ? [((x % width) + width) % width, ((y % height) + height) % height] : [x, y];
   }
 
-  /** Where a shape is drawn: once, and on a view that wraps again on the far side. @param {{ x: number, y: number }} around */
+  /**
+   * Where a shape is drawn: once, and on a view that wraps again on the far side.
+   * @param {{ x: number, y: number }} around
+   */
   moves(around) {
-    const [x, y] = this.place(around), reach = 40 * this.scale, { width, height } = this.canvas;
-    const across = [0], down = [0];
+    const [x, y] = this.place(around),
+      reach = 40 * this.scale,
+      { width, height } = this.canvas;
+    const across = [0],
+      down = [0];
     if (this.wraps) {
       across.push(...(x < reach ? [width] : []), ...(x > width - reach ? [-width] : []));
       down.push(...(y < reach ? [height] : []), ...(y > height - reach ? [-height] : []));
@@ -320,17 +352,19 @@ export class Camera {
     return across.flatMap((right) => down.map((low) => /** @type {Point} */ ([x + right, y + low])));
   }
 
-  /** A closed shape, from a point: no rounding far from the origin. @param {number[][]} points m @param {{ x: number, y: number }} around */
+  /**
+   * A closed shape, from a point: no rounding far from the origin.
+   * @param {number[][]} points m
+   * @param {{ x: number, y: number }} around
+   */
   fill(points, around, edged = false) {
     const { context: c } = this.canvas;
     for (const [x, y] of this.moves(around)) {
       c.beginPath();
-      for (const each of points)
-        c.lineTo(x + this.scale * each[0], y + this.scale * each[1]);
+      for (const each of points) c.lineTo(x + this.scale * each[0], y + this.scale * each[1]);
       c.closePath();
       c.fill();
-      if (edged)
-        c.stroke();
+      if (edged) c.stroke();
     }
   }
 
@@ -344,30 +378,70 @@ export class Camera {
 /** The craft, around the centre of gravity, bow ahead. @param {Shown["size"]} size */
 function outline({ length, width }) {
   const [ahead, side] = [length / 2, width / 2];
-  return [[0.75 * length, 0], [ahead, side], [-ahead, side], [-ahead, -side], [ahead, -side]];
+  return [
+    [0.75 * length, 0],
+    [ahead, side],
+    [-ahead, side],
+    [-ahead, -side],
+    [ahead, -side],
+  ];
 }
 
-/** What is blown out: the stronger the push, the longer; reverse thrust blows forward. @param {Shown} shown @returns {[string, number[][]][]} */
+/**
+ * What is blown out: the stronger the push, the longer; reverse thrust blows forward.
+ * @param {Shown} shown
+ * @returns {[string, number[][]][]}
+ */
 function jets({ size, inputs }) {
   const [stern, bow, side] = [-size.length / 2, size.length / 2, size.width / 2];
-  const root = 0.06 * size.length, wide = side / 2, reach = 0.9 * size.width;
+  const root = 0.06 * size.length,
+    wide = side / 2,
+    reach = 0.9 * size.width;
   const push = (0.7 * size.length * inputs.thrust) / (size.thrust || 1);
   return [
-    ["thrust", [[stern, -wide], [stern, wide], [stern - push, 0]]],
-    ["port", [[bow - root, -side], [bow + root, -side], [bow, -side - reach * inputs.port_thruster]]],
-    ["starboard", [[bow - root, side], [bow + root, side], [bow, side + reach * inputs.starboard_thruster]]],
+    [
+      "thrust",
+      [
+        [stern, -wide],
+        [stern, wide],
+        [stern - push, 0],
+      ],
+    ],
+    [
+      "port",
+      [
+        [bow - root, -side],
+        [bow + root, -side],
+        [bow, -side - reach * inputs.port_thruster],
+      ],
+    ],
+    [
+      "starboard",
+      [
+        [bow - root, side],
+        [bow + root, side],
+        [bow, side + reach * inputs.starboard_thruster],
+      ],
+    ],
   ];
 }
 
 /** Points of the body, as they lie at a heading. @param {number[][]} points @param {number} heading */
 function turned(points, heading) {
-  const c = Math.cos(heading), s = Math.sin(heading);
+  const c = Math.cos(heading),
+    s = Math.sin(heading);
   return points.map(([ahead, across]) => [c * ahead - s * across, s * ahead + c * across]);
 }
 
 /** Port and starboard. @param {Pose} gate */
 function posts(gate) {
-  return turned([[0, -GATE_WIDTH / 2], [0, GATE_WIDTH / 2]], gate.heading).map(([x, y]) => ({ x: gate.x + x, y: gate.y + y }));
+  return turned(
+    [
+      [0, -GATE_WIDTH / 2],
+      [0, GATE_WIDTH / 2],
+    ],
+    gate.heading,
+  ).map(([x, y]) => ({ x: gate.x + x, y: gate.y + y }));
 }
 
 /** @param {CanvasRenderingContext2D} c @param {Point} a @param {Point} b */
@@ -384,11 +458,22 @@ function dot(c, at, radius, color) {
   c.fill();
 }
 
-/** @param {CanvasRenderingContext2D} c @param {Point} at @param {number} angle @param {number} size @param {string} fill */
+/**
+ * @param {CanvasRenderingContext2D} c
+ * @param {Point} at
+ * @param {number} angle
+ * @param {number} size
+ * @param {string} fill
+ */
 function arrow(c, at, angle, size, fill, edge = "") {
   c.fillStyle = fill;
   c.beginPath();
-  for (const [turn, reach] of [[0, 1], [2.5, 1], [Math.PI, 0.4], [-2.5, 1]])
+  for (const [turn, reach] of [
+    [0, 1],
+    [2.5, 1],
+    [Math.PI, 0.4],
+    [-2.5, 1],
+  ])
     c.lineTo(at[0] + size * reach * Math.cos(angle + turn), at[1] + size * reach * Math.sin(angle + turn));
   c.closePath();
   c.fill();

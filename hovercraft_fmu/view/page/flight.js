@@ -51,12 +51,9 @@ export class Helm {
 
   /** @param {string} what @param {number} value */
   take(what, value) {
-    if (what in this.values)
-      this.values[what] = value;
-    else if (value)
-      this.held.add(what);
-    else
-      this.held.delete(what);
+    if (what in this.values) this.values[what] = value;
+    else if (value) this.held.add(what);
+    else this.held.delete(what);
   }
 
   inputs() {
@@ -120,10 +117,11 @@ export class Reel {
   }
 
   inputs() {
-    const time = this.n * this.step, { rows, inputs } = this.scene;
-    while (this.row + 1 < rows.length && rows[this.row + 1][0] <= time)
-      this.row++;
-    const here = rows[this.row], next = rows[this.row + 1] ?? here;
+    const time = this.n * this.step,
+      { rows, inputs } = this.scene;
+    while (this.row + 1 < rows.length && rows[this.row + 1][0] <= time) this.row++;
+    const here = rows[this.row],
+      next = rows[this.row + 1] ?? here;
     const share = next[0] > here[0] ? (time - here[0]) / (next[0] - here[0]) : 0;
     const values = { ...this.start };
     inputs.forEach((name, i) => (values[name] = here[i + 1] + share * (next[i + 1] - here[i + 1])));
@@ -194,21 +192,16 @@ export class Flight {
     const began = performance.now();
     let made = 0;
     try {
-      for (; made < inputs.length; made++)
-        this.go(this.craft, first + made, inputs[made]);
+      for (; made < inputs.length; made++) this.go(this.craft, first + made, inputs[made]);
     } catch (error) {
-      if (!(error instanceof Refusal))
-        throw error;
+      if (!(error instanceof Refusal)) throw error;
       refusal = error;
     }
     this.wall += (performance.now() - began) / 1000;
-    for (let i = 0; i < made; i++)
-      this.go(this.ghost, first + i, inputs[i]);
+    for (let i = 0; i < made; i++) this.go(this.ghost, first + i, inputs[i]);
     this.steps = first + made;
-    if (made)
-      this.inputs = inputs[made - 1];
-    if (refusal)
-      throw refusal;
+    if (made) this.inputs = inputs[made - 1];
+    if (refusal) throw refusal;
   }
 
   /** @param {Instance} one @param {number} n @param {Values} inputs */
@@ -219,7 +212,8 @@ export class Flight {
 
   /** @returns {Seen} */
   see() {
-    const craft = this.craft.get(...SEEN), ghost = this.ghost.get(...STATES);
+    const craft = this.craft.get(...SEEN),
+      ghost = this.ghost.get(...STATES);
     const distance = Math.hypot(craft["pose.x"] - ghost["pose.x"], craft["pose.y"] - ghost["pose.y"]);
     return { craft, ghost, distance };
   }
@@ -236,17 +230,20 @@ export class Flight {
 
   /** The control log: a row where inputs change, two rows at the time of a jump, and the last communication point. */
   log() {
-    const source = this.source.again(), names = Object.keys(this.inputs);
-    const line = (/** @type {number} */ n, /** @type {Values} */ row) => [n * this.step, ...names.map((name) => row[name])];
+    const source = this.source.again(),
+      names = Object.keys(this.inputs);
+    const line = (/** @type {number} */ n, /** @type {Values} */ row) => [
+      n * this.step,
+      ...names.map((name) => row[name]),
+    ];
     const lines = [];
     /** @type {Values | null} */
     let held = null;
     for (let n = 0; n < this.steps; n++, source.pass()) {
-      const now = source.inputs(), before = held;
-      if (before && names.every((name) => before[name] === now[name]))
-        continue;
-      if (before)
-        lines.push(line(n, before));
+      const now = source.inputs(),
+        before = held;
+      if (before && names.every((name) => before[name] === now[name])) continue;
+      if (before) lines.push(line(n, before));
       lines.push(line(n, now));
       held = now;
     }

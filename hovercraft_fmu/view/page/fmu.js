@@ -42,9 +42,12 @@ export class Description {
     this.name = root.getAttribute("modelName") ?? "";
     this.token = root.getAttribute("instantiationToken") ?? "";
     /** @type {Map<string, Element[]>} */
-    const types = new Map([...root.querySelectorAll("EnumerationType")].map((type) => [
-      type.getAttribute("name") ?? "", [...type.children],
-    ]));
+    const types = new Map(
+      [...root.querySelectorAll("EnumerationType")].map((type) => [
+        type.getAttribute("name") ?? "",
+        [...type.children],
+      ]),
+    );
     /** @type {Map<string, Variable>} */
     this.variables = new Map();
     for (const each of root.querySelectorAll("ModelVariables > *")) {
@@ -57,8 +60,7 @@ export class Description {
   /** @param {string} name */
   variable(name) {
     const found = this.variables.get(name);
-    if (!found)
-      throw new Refusal(`${name}: must be a variable of ${this.name}`);
+    if (!found) throw new Refusal(`${name}: must be a variable of ${this.name}`);
     return found;
   }
 
@@ -163,36 +165,43 @@ export class Instance {
     });
     const token = library.write(description.token);
     this.component = library.functions.fmi3InstantiateCoSimulation(
-      token, token, 0, 0, 1, 0, 0, 0, 0, this.number, library.callback, 0,
+      token,
+      token,
+      0,
+      0,
+      1,
+      0,
+      0,
+      0,
+      0,
+      this.number,
+      library.callback,
+      0,
     );
-    if (!this.component)
-      throw new Refusal(this.said || "the FMU could not be instantiated");
+    if (!this.component) throw new Refusal(this.said || "the FMU could not be instantiated");
   }
 
   /** A function of FMI, after whose name comes what it takes after the instance. @param {string} name */
   call(name, /** @type {unknown[]} */ ...given) {
     const status = this.library.functions[`fmi3${name}`](this.component, ...given);
-    if (status >= DISCARD)
-      throw new Refusal(this.said || `fmi3${name}: ${STATUSES[status]}`);
+    if (status >= DISCARD) throw new Refusal(this.said || `fmi3${name}: ${STATUSES[status]}`);
   }
 
   /** Start values and inputs. @param {Values} values */
   set(values) {
     for (const [type, names] of this.sorted(Object.keys(values))) {
       this.place(names);
-      if (type === "Float64")
-        this.library.floats(NUMBERS, names.length).set(names.map((name) => values[name]));
-      else if (type === "Int32")
-        this.library.words(NUMBERS, names.length).set(names.map((name) => values[name]));
-      else
-        this.library.longs(NUMBERS, names.length).set(names.map((name) => BigInt(values[name])));
+      if (type === "Float64") this.library.floats(NUMBERS, names.length).set(names.map((name) => values[name]));
+      else if (type === "Int32") this.library.words(NUMBERS, names.length).set(names.map((name) => values[name]));
+      else this.library.longs(NUMBERS, names.length).set(names.map((name) => BigInt(values[name])));
       this.transfer("Set", type, names.length);
     }
   }
 
   /** All inputs, which are Float64: what is called at every step makes no lists. @param {Values} values */
   setInputs(values) {
-    const { inputs } = this.description, references = this.library.words(REFERENCES, inputs.length);
+    const { inputs } = this.description,
+      references = this.library.words(REFERENCES, inputs.length);
     const numbers = this.library.floats(NUMBERS, inputs.length);
     for (let i = 0; i < inputs.length; i++) {
       references[i] = inputs[i].reference;
@@ -209,8 +218,12 @@ export class Instance {
       this.place(some);
       this.transfer("Get", type, some.length);
       const { library } = this;
-      const found = type === "Float64" ? library.floats(NUMBERS, some.length)
-        : type === "Int32" ? library.words(NUMBERS, some.length) : library.longs(NUMBERS, some.length);
+      const found =
+        type === "Float64"
+          ? library.floats(NUMBERS, some.length)
+          : type === "Int32"
+            ? library.words(NUMBERS, some.length)
+            : library.longs(NUMBERS, some.length);
       some.forEach((name, i) => (values[name] = Number(found[i])));
     }
     return values;

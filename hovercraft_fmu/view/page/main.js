@@ -37,13 +37,19 @@ class Page {
     this.last = { chart: 0, cost: 0, spoken: 0, time: 0, wall: 0, substeps: 0 };
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
     this.picture = new Picture(
-      /** @type {HTMLCanvasElement} */ (element("view")), /** @type {HTMLCanvasElement} */ (element("map")),
+      /** @type {HTMLCanvasElement} */ (element("view")),
+      /** @type {HTMLCanvasElement} */ (element("map")),
       /** @type {HTMLCanvasElement} */ (element("compass")),
     );
     this.chart = new Chart(/** @type {HTMLCanvasElement} */ (element("chart")));
     const actions = {
-      act: this.act.bind(this), pause: this.pause.bind(this), stepOnce: this.stepOnce.bind(this), reset: this.reset.bind(this),
-      gates: this.toggleGates.bind(this), save: this.save.bind(this), change: this.change.bind(this),
+      act: this.act.bind(this),
+      pause: this.pause.bind(this),
+      stepOnce: this.stepOnce.bind(this),
+      reset: this.reset.bind(this),
+      gates: this.toggleGates.bind(this),
+      save: this.save.bind(this),
+      change: this.change.bind(this),
     };
     this.controls = new Controls(actions, data, description, () => this.settings);
     this.flight = this.begun({}, 0);
@@ -68,13 +74,19 @@ class Page {
     return this.settings.integrator === "adaptive" ? ADAPTIVE_STEP : Math.max(SHORTEST, this.settings.step_size);
   }
 
-  /** A flight with the settings, from a state, with a thrust [N] at the helm. @param {Values} state @param {number} thrust */
+  /**
+   * A flight with the settings, from a state, with a thrust [N] at the helm.
+   * @param {Values} state
+   * @param {number} thrust
+   */
   begun(state, thrust) {
     const { data, description, settings } = this;
     const moved = Object.entries(state).filter(([, value]) => value !== 0);
     const values = { ...startValues(settings, data, description), ...Object.fromEntries(moved) };
     this.thrust = thrust;
-    return new Flight(this.library, description, values, this.newSource(values), this.step, (status, text) => this.say(status, text));
+    return new Flight(this.library, description, values, this.newSource(values), this.step, (status, text) =>
+      this.say(status, text),
+    );
   }
 
   /** Who is at the helm. @param {Values} values of the start */
@@ -82,18 +94,21 @@ class Page {
     /** @type {Values} */
     const rest = {};
     for (const { name } of this.description.inputs)
-      rest[name] = HELM.includes(name) ? 0 : this.settings.inputs[name] ?? 0;
+      rest[name] = HELM.includes(name) ? 0 : (this.settings.inputs[name] ?? 0);
     const scene = sceneOf(this.settings, this.data);
-    if (scene)
-      return new Reel(scene, rest, this.step);
-    const [low, high] = ["thrust_min", "thrust_max"].map((name) => values[name] ?? this.description.variable(name).start ?? 0);
+    if (scene) return new Reel(scene, rest, this.step);
+    const [low, high] = ["thrust_min", "thrust_max"].map(
+      (name) => values[name] ?? this.description.variable(name).start ?? 0,
+    );
     const thrust = Math.min(Math.max(this.thrust ?? 0, low), high);
     return new Helm({ ...rest, thrust }, [low, high], this.step);
   }
 
   /** Another flight: from where the craft is, or from the start. @param {boolean} fromStart */
   begin(fromStart) {
-    const { flight } = this, held = this.held(), state = fromStart ? {} : flight.craft.get(...STATES);
+    const { flight } = this,
+      held = this.held(),
+      state = fromStart ? {} : flight.craft.get(...STATES);
     this.clearNotices();
     try {
       this.flight = this.begun(state, fromStart ? 0 : flight.inputs.thrust);
@@ -110,10 +125,8 @@ class Page {
   /** What is seen and counted begins anew; keys that are held go on. @param {string[]} held */
   begunAgain(held) {
     held.forEach((what) => this.act(what, 1));
-    if (this.fromStart)
-      this.picture.clear();
-    if (this.fromStart && this.course)
-      this.course = new Course(pose(this.flight.see().craft));
+    if (this.fromStart) this.picture.clear();
+    if (this.fromStart && this.course) this.course = new Course(pose(this.flight.see().craft));
     this.chart.clear();
     this.failed = "";
     this.stale = true;
@@ -129,8 +142,7 @@ class Page {
 
   /** @param {string} what @param {number} value */
   act(what, value) {
-    if (this.flight.source instanceof Helm)
-      this.flight.source.act(what, value);
+    if (this.flight.source instanceof Helm) this.flight.source.act(what, value);
     if (this.description.variables.has(what)) {
       this.settings.inputs = { ...this.settings.inputs, [what]: value };
       this.settled();
@@ -146,14 +158,14 @@ class Page {
   }
 
   stepOnce() {
-    if (!this.paused)
-      this.pause();
+    if (!this.paused) this.pause();
     this.advance(1);
   }
 
   /** Back to the start: where the flight began there, by its saved state. */
   reset() {
-    const { flight } = this, held = this.held();
+    const { flight } = this,
+      held = this.held();
     if (!this.fromStart) {
       this.begin(true);
       return;
@@ -166,8 +178,7 @@ class Page {
 
   toggleGates() {
     this.course = this.course ? null : new Course(pose(this.flight.see().craft));
-    if (this.course && this.settings.view === "wrap")
-      this.change({ view: "open" });
+    if (this.course && this.settings.view === "wrap") this.change({ view: "open" });
     this.stale = true;
     write("gates", this.course ? "No gates" : "Course of gates");
   }
@@ -181,8 +192,7 @@ class Page {
     const differs = (/** @type {keyof typeof before} */ name) => this.settings[name] !== before[name];
     if (Object.keys(change).some((name) => name !== "scale" && name !== "view"))
       this.begin(differs("scene") || differs("preset") || this.settings.scene !== "");
-    if (this.paused && this.flight.steps === 0 && this.fromStart)
-      this.pause();
+    if (this.paused && this.flight.steps === 0 && this.fromStart) this.pause();
   }
 
   settled() {
@@ -207,8 +217,7 @@ class Page {
     notice.textContent = text;
     notice.className = status === "Warning" ? "" : "bad";
     element("notices").append(notice);
-    while (element("notices").childElementCount > MOST_NOTICES)
-      element("notices").firstElementChild?.remove();
+    while (element("notices").childElementCount > MOST_NOTICES) element("notices").firstElementChild?.remove();
   }
 
   clearNotices() {
@@ -217,11 +226,9 @@ class Page {
 
   /** @param {unknown} error */
   fail(error) {
-    if (!(error instanceof Refusal))
-      throw error;
+    if (!(error instanceof Refusal)) throw error;
     this.failed = error.message;
-    if (!element("notices").textContent?.includes(error.message))
-      this.say("Error", error.message);
+    if (!element("notices").textContent?.includes(error.message)) this.say("Error", error.message);
   }
 
   showCommand() {
@@ -234,9 +241,9 @@ class Page {
   frame(now) {
     const began = performance.now();
     const { flight, pace, settings } = this;
-    if (this.paused || this.failed || document.hidden)
-      pace.restart(now);
-    const due = pace.due(now, settings.scale, flight.step), most = Math.floor((LONGEST_LAG * settings.scale) / flight.step) + 1;
+    if (this.paused || this.failed || document.hidden) pace.restart(now);
+    const due = pace.due(now, settings.scale, flight.step),
+      most = Math.floor((LONGEST_LAG * settings.scale) / flight.step) + 1;
     this.late = due > most;
     for (let left = Math.min(due, most); left > 0 && !this.failed;) {
       const some = Math.min(left, 50);
@@ -248,14 +255,11 @@ class Page {
         break;
       }
     }
-    if (this.late)
-      pace.restart(now);
-    if (this.stale)
-      this.draw(now);
+    if (this.late) pace.restart(now);
+    if (this.stale) this.draw(now);
     this.stale = !this.paused && !this.failed;
     this.frames.push(performance.now() - began);
-    if (this.frames.length > 300)
-      this.frames.shift();
+    if (this.frames.length > 300) this.frames.shift();
   }
 
   /** @param {number} n communication steps */
@@ -266,16 +270,22 @@ class Page {
     } catch (error) {
       this.fail(error);
     }
-    if (this.course)
-      this.course.pass(pose(this.flight.see().craft), this.flight.time);
+    if (this.course) this.course.pass(pose(this.flight.see().craft), this.flight.time);
   }
 
   /** @param {number} now s */
   draw(now) {
-    const { flight, picture } = this, seen = flight.see(), craft = pose(seen.craft);
+    const { flight, picture } = this,
+      seen = flight.see(),
+      craft = pose(seen.craft);
     const shown = {
-      craft, ghost: pose(seen.ghost), inputs: flight.inputs, course: this.course, wraps: this.settings.view === "wrap",
-      still: this.still.matches, size: this.size(),
+      craft,
+      ghost: pose(seen.ghost),
+      inputs: flight.inputs,
+      course: this.course,
+      wraps: this.settings.view === "wrap",
+      still: this.still.matches,
+      size: this.size(),
     };
     picture.pass(shown);
     picture.draw(shown);
@@ -285,29 +295,38 @@ class Page {
       this.chart.add(seen.distance, seen.craft["error.position"]);
       this.chart.draw();
     }
-    if (now - this.last.cost > COST_EVERY)
-      this.writeCosts(now, seen.craft.substeps);
+    if (now - this.last.cost > COST_EVERY) this.writeCosts(now, seen.craft.substeps);
     if (now - this.last.spoken > SPEAK_EVERY && !this.paused) {
       this.last.spoken = now;
-      write("spoken", ["speed", "heading", "thrust", "clock"].map((id) => `${id} ${element(id).textContent}`).join(", "));
+      write(
+        "spoken",
+        ["speed", "heading", "thrust", "clock"].map((id) => `${id} ${element(id).textContent}`).join(", "),
+      );
     }
-    if (flight.source.ended && !this.paused)
-      this.pause();
+    if (flight.source.ended && !this.paused) this.pause();
   }
 
   size() {
-    const start = (/** @type {string} */ name) => this.flight.values[name] ?? this.description.variable(name).start ?? 0;
-    return { length: start("length"), width: start("width"), thrust: Math.max(Math.abs(start("thrust_min")), Math.abs(start("thrust_max"))) };
+    const start = (/** @type {string} */ name) =>
+      this.flight.values[name] ?? this.description.variable(name).start ?? 0;
+    return {
+      length: start("length"),
+      width: start("width"),
+      thrust: Math.max(Math.abs(start("thrust_min")), Math.abs(start("thrust_max"))),
+    };
   }
 
   /** @param {import("./flight.js").Seen} seen */
   write({ craft, distance }) {
-    const { flight, settings } = this, thrust = flight.inputs.thrust, { limits } = /** @type {Helm} */ (flight.source);
-    const degrees = (((craft["pose.heading"] * 180) / Math.PI) % 360 + 360) % 360;
+    const { flight, settings } = this,
+      thrust = flight.inputs.thrust,
+      { limits } = /** @type {Helm} */ (flight.source);
+    const degrees = ((((craft["pose.heading"] * 180) / Math.PI) % 360) + 360) % 360;
     write("speed", `${craft.speed < 1e4 ? craft.speed.toFixed(2) : craft.speed.toExponential(1)} m/s`);
     write("heading", `${degrees.toFixed(0)}°`);
     write("thrust", `${thrust.toFixed(1)} N`);
-    const [low, high] = limits ?? [0, this.size().thrust], span = high - low || 1;
+    const [low, high] = limits ?? [0, this.size().thrust],
+      span = high - low || 1;
     element("thrust-bar").style.left = `${(100 * (Math.min(thrust, 0) - low)) / span}%`;
     element("thrust-bar").style.width = `${(100 * Math.abs(thrust)) / span}%`;
     write("time", `${flight.time.toFixed(1)} s${this.late ? ", late" : ""}`);
@@ -325,10 +344,11 @@ class Page {
 
   /** @param {number} now s @param {number} substeps */
   writeCosts(now, substeps) {
-    const { flight, last } = this, passed = flight.time - last.time;
+    const { flight, last } = this,
+      passed = flight.time - last.time;
     const of_each = this.data.methods[this.settings.integrator].stages * (this.settings.estimate ? 3 : 1);
     if (last.cost && passed > 0) {
-      write("loads", ((of_each * (substeps - last.substeps)) / passed).toFixed(0));
+      write("loads", String(Number(((of_each * (substeps - last.substeps)) / passed).toPrecision(3))));
       write("cost", `${Number(((1e6 * (flight.wall - last.wall)) / passed).toPrecision(2))} µs`);
     }
     Object.assign(last, { cost: now, time: flight.time, wall: flight.wall, substeps });
@@ -340,13 +360,21 @@ const pose = (seen) => ({ x: seen["pose.x"], y: seen["pose.y"], heading: seen["p
 
 /** A length in its best unit. @param {number} length m */
 function metres(length) {
-  const [factor, unit] = length === 0 || length >= 1 ? [1, "m"] : length >= 1e-3 ? [1e3, "mm"] : length >= 1e-6 ? [1e6, "µm"] : [1e9, "nm"];
+  const [factor, unit] =
+    length === 0 || length >= 1 ? [1, "m"] : length >= 1e-3 ? [1e3, "mm"] : length >= 1e-6 ? [1e6, "µm"] : [1e9, "nm"];
   return length >= 1e4 ? `${length.toExponential(1)} m` : `${Number((length * factor).toPrecision(3))} ${unit}`;
 }
 
-/** Two thirds of it are up to the limit. @param {string} id @param {number} value @param {number | null} limit @param {string} unit */
+/**
+ * Two thirds of it are up to the limit.
+ * @param {string} id
+ * @param {number} value
+ * @param {number | null} limit
+ * @param {string} unit
+ */
 function gauge(id, value, limit, unit) {
-  const bar = /** @type {HTMLElement} */ (element(id).firstElementChild), part = limit ? value / limit : 0;
+  const bar = /** @type {HTMLElement} */ (element(id).firstElementChild),
+    part = limit ? value / limit : 0;
   bar.style.width = `${Math.min(66.6 * part, 100)}%`;
   bar.classList.toggle("over", part > 1);
   write(`${id}-text`, `${Number(value.toPrecision(2))}${unit}${limit ? ` of ${limit}` : ", no limit"}`);
@@ -367,13 +395,17 @@ const library = await Library.load(await unpacked(data.module));
 element("sorry").hidden = true;
 element("app").hidden = false;
 const page = new Page(library, description, data);
-write("about", `${description.name} ${data.version}, FMI ${library.version}, in your browser: nothing is installed or sent.`);
+write(
+  "about",
+  `${description.name} ${data.version}, FMI ${library.version}, in your browser: nothing is installed or sent.`,
+);
 /** @param {number} now ms */
 const go = (now) => {
   page.frame(now / 1000);
   requestAnimationFrame(go);
 };
 requestAnimationFrame(go);
+addEventListener("hashchange", () => location.reload());
 /** @param {string} name @param {number} ratio */
 const priced = (name, ratio) => write(`price-${name}`, `× ${ratio.toFixed(2)}`);
 setTimeout(() => measurePrices(library, description, data.terms, priced), 500);

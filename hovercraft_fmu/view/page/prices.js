@@ -20,11 +20,15 @@ export async function measurePrices(library, description, terms, tell) {
       await new Promise((resolve) => setTimeout(resolve, 20));
       least.set(term.name, Math.min(least.get(term.name) ?? Infinity, timed(library, description, term)));
     }
-  for (const { name } of terms)
-    tell(name, (least.get(name) ?? NaN) / (least.get("") ?? NaN));
+  for (const { name } of terms) tell(name, (least.get(name) ?? NaN) / (least.get("") ?? NaN));
 }
 
-/** s. @param {import("./fmu.js").Library} library @param {import("./fmu.js").Description} description @param {import("./settings.js").Term} term */
+/**
+ * s.
+ * @param {import("./fmu.js").Library} library
+ * @param {import("./fmu.js").Description} description
+ * @param {import("./settings.js").Term} term
+ */
 function timed(library, description, term) {
   const craft = new Instance(library, description, () => {});
   craft.initialize(term.input ? {} : term.values, term.input ? term.values : {});
