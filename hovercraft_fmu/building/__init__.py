@@ -21,12 +21,16 @@ from ..fmu.native_package import build_native_fmu
 from ..fmu.near_names import explains_keywords, must_be_one_of
 from ..fmu.python_package import build_fmu, hovercraft_content, python_identity
 from ..fmu.start_values import Value, variant
+from ..tether.tether_package import CONTENT as TETHER_CONTENT
+from ..tether.tether_package import build_tether
 from ..view.page import FILE as PAGE
 from ..view.page import page
 from ..whole import temporary_folder
 from .ssp import build_ssp
 
-Kind: TypeAlias = Literal["native", "native3", "python", "autopilot", "native_loop", "native3_loop", "python_loop"]
+Kind: TypeAlias = Literal[
+    "native", "native3", "python", "autopilot", "tether", "native_loop", "native3_loop", "python_loop"
+]
 FOLDER = Path("build")
 
 
@@ -90,6 +94,12 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
             "FMI 2.0, Python: takes the craft from waypoint to waypoint",
             build_autopilot,
             lambda: python_identity(AUTOPILOT_CONTENT),
+        ),
+        "tether": Product(
+            "Tether.fmu",
+            "FMI 2.0, Python: a line between two hovercraft",
+            build_tether,
+            lambda: python_identity(TETHER_CONTENT),
         ),
         "native_loop": _loop(NATIVE),
         "native3_loop": _loop(NATIVE3),

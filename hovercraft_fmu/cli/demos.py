@@ -19,18 +19,23 @@ DEMO_FOLDER = FOLDER / "demo"
 
 @click.command()
 @click.option("--loop", is_flag=True, help="The closed loop: an autopilot FMU takes it round a course in a crosswind.")
-def demo(loop: bool) -> None:
+@click.option("--tow", is_flag=True, help="A tow: one craft pulls another one round a bend, by a line that is an FMU.")
+def demo(loop: bool, tow: bool) -> None:
     """Build the FMUs, check them, and drive them over a recorded control log; see build/demo/."""
     from ..building import default_kind
     from ..drawing.figures import check_plot
     from ..scenes import CONTROL_LOGS, SCENES
     from ..simulation import holding, plan
 
-    picture = check_plot(DEMO_FOLDER / ("loop.png" if loop else "ice.png"))
-    make_room(picture, picture.with_suffix(".csv"))
+    if loop and tow:
+        raise click.UsageError("--loop and --tow: must not be given together")
+    picture = check_plot(DEMO_FOLDER / ("loop.png" if loop else "tow.png" if tow else "ice.png"))
+    make_room(picture, picture.with_suffix(".csv"), *([picture.with_suffix(".gif")] if tow else []))
     native = _built_and_valid(default_kind())
     if loop:
         return _demo_of_the_loop(native, _built_and_valid("autopilot"), picture)
+    if tow:
+        return _demo_of_the_tow(native, _built_and_valid("tether"), picture)
     python = _built_and_valid("python")
     run = plan(CONTROL_LOGS / "ice.csv", preset="ice", communication_step=SCENES["ice"].communication_step)
     result, one, other = (simulated(*each) for each in ((run, native), (holding(run), native), (holding(run), python)))
@@ -71,6 +76,26 @@ def _demo_of_the_loop(fmu: Path, autopilot: Path, picture: Path) -> None:
     _print_passage(passage)
     OUTPUT.print(f"wrote {passage.write_csv(DEMO_FOLDER / 'loop.csv')}")
     OUTPUT.print(f"wrote {plot_passage(passage, picture)}")
+
+
+def _demo_of_the_tow(fmu: Path, tether: Path, picture: Path) -> None:
+    from ..towing import BEND, haul
+    from ..view.tow_pictures import animate_tow, plot_tow
+
+    with progress_of(BEND.stop_time) as progress:
+        towed = haul(BEND, fmu, tether, progress=progress)
+    print_rows(
+        "A tow on ice: one craft pulls another one round a bend",
+        {
+            "tension": f"{towed['tension'].max():.2f} N at most, {towed['tension'].mean():.2f} N in the mean",
+            "line": f"{towed['distance'].max():.2f} m at most; below {towed.tow.line.slack_length:g} m it hangs loose",
+            "heading at the end": f"first {towed['first.pose.heading'][-1]:.2f} rad, "
+            f"second {towed['second.pose.heading'][-1]:.2f} rad",
+        },
+    )
+    OUTPUT.print(f"wrote {towed.write_csv(picture.with_suffix('.csv'))}")
+    OUTPUT.print(f"wrote {plot_tow(towed, picture)}")
+    OUTPUT.print(f"wrote {animate_tow(towed, picture.with_suffix('.gif'))}")
 
 
 def _print_passage(passage: "Passage") -> None:

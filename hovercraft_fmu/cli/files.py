@@ -29,7 +29,8 @@ def build(
 ) -> None:
     """Write the FMUs and the SSP files of the closed loop.
 
-    KIND is native, native3, python, autopilot, native_loop, native3_loop or python_loop; without it all are written,
+    KIND is native, native3, python, autopilot, tether, native_loop, native3_loop or python_loop; without it all are
+    written,
     and with --name the native FMU alone.
     """
     from ..building import PRODUCTS, product, variant_product

@@ -37,6 +37,8 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
         "m/s": Unit("Velocity", "Velocity", {"m": 1, "s": -1}),
         "m/s2": Unit("Acceleration", "Acceleration", {"m": 1, "s": -2}),
         "m2": Unit("Area", "Area", {"m": 2}),
+        "N.s/m": Unit("Damping", "Damping", {"kg": 1, "s": -1}),
+        "N/m": Unit("Stiffness", "Stiffness", {"kg": 1, "s": -2}),
         "N": Unit("Force", "Force", {"kg": 1, "m": 1, "s": -2}),
         "N.m": Unit("Moment", "Torque", {"kg": 1, "m": 2, "s": -2}),
         "rad": Unit("Angle", "Angle", {"rad": 1}, ("deg", DEGREES_PER_RADIAN)),

@@ -31,8 +31,11 @@ from ..simulation import plan, run_model
 from ..sweeps import sweep
 from ..sweeps.charts import plot_sweep
 from ..sweeps.study import SHIPPED
+from ..tether import tether_package
+from ..towing import BEND, haul
 from ..view.diagram import draw_diagram
 from ..view.plots import plot_passage, plot_run
+from ..view.tow_pictures import plot_tow
 from ..whole import temporary_folder, write_whole
 from . import closed_loop, scene_terms, work_precision
 
@@ -116,9 +119,8 @@ def assemble(results: Path = RESULTS) -> list[Path]:
             picture = next((each / name for each in (Path(folder), results) if (each / name).exists()), None)
             if picture:
                 files[PACKED / name] = in_palette(picture, shown(name))
-        files[pilot_package.HERE / pilot_package.PICTURE] = in_palette(
-            Path(folder) / pilot_package.PICTURE, "", COLORS_OF_LOOP
-        )
+        for package in (pilot_package, tether_package):
+            files[package.HERE / package.PICTURE] = in_palette(Path(folder) / package.PICTURE, "", COLORS_OF_LOOP)
         files[RESULT] = default_result(build_native_fmu(Path(folder) / "HovercraftNative.fmu"))
     for path, content in files.items():
         write_whole(path, content)
@@ -142,6 +144,8 @@ def _draw(folder: Path) -> None:
     plot_run(run_model(ice), folder / "ice.png")
     fmu, autopilot = build_fmu(folder / "Hovercraft.fmu"), pilot_package.build_autopilot(folder / "Autopilot.fmu")
     plot_passage(sail(VOYAGES["crosswind"], fmu, autopilot), folder / pilot_package.PICTURE)
+    tether = tether_package.build_tether(folder / "Tether.fmu")
+    plot_tow(haul(BEND, fmu, tether), folder / tether_package.PICTURE)
     study = SHIPPED / "turning_circle.toml"
     plot_sweep(sweep(study, engine="batch", workers=1, output=folder / "sweep").folder, folder / "turning_circle.png")
 

@@ -1,0 +1,132 @@
+"""Pictures of a tow: both craft and the line between them, still and moving."""
+
+import importlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PIL import Image
+
+from ..drawing.figures import check_plot, new_figure, save
+from ..drawing.palette import CRAFT, INK, QUIET, SEA, SWAY
+from ..drawing.shapes import placed
+from ..fmu.icon import outline
+from ..towing import Towed
+from ..whole import written
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLORS = {"first": SEA, "second": SWAY}
+EVERY = 10.0
+"""s: between two places where the craft are drawn."""
+FRAMES = 80
+"""At most."""
+FRAME_TIME, LAST_FRAME_TIME = 75, 2000
+"""ms"""
+
+
+def plot_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
+    """Draw the paths with both craft and the line along them, tension and distance and speeds over time: a PNG, SVG or
+    PDF.
+
+    Raises:
+        ValueError, ModuleNotFoundError: see `check_plot`.
+        OSError: the file cannot be written.
+    """
+    path = check_plot(path)
+    figure = new_figure(figsize=(12.0, 6.75), dpi=120, layout="constrained")
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
+    time, taut = towed["time"], towed["tension"] > 0.0
+    figure.suptitle(f"A tow on ice: the line pulls at {towed['tension'].max():.1f} N at most; it is taut for "
+                    f"{100 * taut.mean():.0f} % of {time[-1]:g} s")  # fmt: skip
+    axes = figure.add_subplot(grid[:, 0])
+    every = np.unique(np.searchsorted(time, np.arange(0.0, time[-1] + EVERY / 2, EVERY) - 1e-6).clip(0, len(time) - 1))
+    _draw_paths(axes, towed)
+    for i in every:
+        _draw_craft(axes, towed, int(i))
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.invert_yaxis()
+    axes.set_title(f"Paths; craft and line every {EVERY:g} s")
+    axes.legend(loc="lower left")
+    tension = figure.add_subplot(grid[0, 1])
+    tension.plot(time, towed["tension"], color=INK, linewidth=1.2)
+    _label(tension, "Tension of the line", "[N]")
+    distance = figure.add_subplot(grid[1, 1], sharex=tension)
+    distance.plot(time, towed["distance"], color=INK, linewidth=1.2)
+    distance.axhline(towed.tow.line.slack_length, color=QUIET, linestyle="--", linewidth=1.0)
+    _label(distance, "Distance of its ends; dashed: below it hangs loose", "[m]")
+    speed = figure.add_subplot(grid[2, 1], sharex=tension)
+    for craft, color in COLORS.items():
+        speed.plot(time, np.hypot(towed[f"{craft}.velocity.x"], towed[f"{craft}.velocity.y"]), color=color)
+    _label(speed, "Speeds", "[m/s]")
+    speed.set_xlabel("time [s]")
+    return save(figure, path)
+
+
+def _label(axes: "Axes", title: str, unit: str) -> None:
+    axes.set_title(title, loc="left")
+    axes.set_ylabel(unit)
+    axes.grid(alpha=0.3)
+
+
+def _draw_paths(axes: "Axes", towed: Towed) -> None:
+    for craft, color in COLORS.items():
+        axes.plot(towed[f"{craft}.pose.x"], towed[f"{craft}.pose.y"], color=color, linewidth=1.2, label=craft)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m], downward")
+    axes.grid(alpha=0.3)
+
+
+def _draw_craft(axes: "Axes", towed: Towed, i: int) -> None:
+    """Both craft, and the line: drawn out where it is taut, dotted where it hangs loose."""
+    for craft, color in COLORS.items():
+        pose = (float(towed[f"{craft}.pose.{name}"][i]) for name in ("x", "y", "heading"))
+        corners = placed(outline(towed.tow.craft), *pose)
+        axes.fill(*np.transpose(corners), facecolor=CRAFT, edgecolor=color, linewidth=1.0, zorder=3)
+    taut = towed["tension"][i] > 0.0
+    axes.plot(*towed.ends()[i].T, color=INK, linewidth=1.0, linestyle="-" if taut else ":", zorder=4)
+
+
+def animate_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
+    """Write both craft on their way, and the line, as a GIF.
+
+    Raises:
+        ValueError: the name does not end in .gif.
+        ModuleNotFoundError: matplotlib is not installed; says how to install it.
+        OSError: the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix != ".gif":
+        raise ValueError(f"animation = {str(path)!r}: must end in .gif (a moving picture)")
+    time = towed["time"]
+    chosen = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], FRAMES) - 1e-6).clip(0, len(time) - 1))
+    room = 1.2 * towed.tow.craft.length
+    low, high = (
+        [bound(bound(towed[f"{craft}.pose.{name}"]) for craft in COLORS) for name in "xy"] for bound in (min, max)
+    )
+    corners = ((low[0] - room, high[0] + room), (high[1] + room, low[1] - room))
+    first, *rest = (_frame(towed, int(i), corners) for i in chosen)
+    palette = first.quantize(colors=64, dither=Image.Dither.NONE)
+    still, *moving = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in (first, *rest))
+    times = [FRAME_TIME] * len(moving) + [LAST_FRAME_TIME]
+    with written(path) as unfinished:
+        still.save(unfinished, "GIF", save_all=True, append_images=moving, duration=times, loop=0, optimize=True)
+    return path
+
+
+def _frame(towed: Towed, i: int, corners: tuple[tuple[float, float], tuple[float, float]]) -> Image.Image:
+    """The view stands still: its left and right, its bottom and top [m]."""
+    figure: Figure = new_figure(figsize=(7.0, 5.0), dpi=80, layout="constrained")
+    canvas = importlib.import_module("matplotlib.backends.backend_agg").FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    _draw_paths(axes, towed)
+    _draw_craft(axes, towed, i)
+    axes.set_xlim(*corners[0])
+    axes.set_ylim(*corners[1])
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_title(f"{towed['time'][i]:.0f} s; the line pulls at {towed['tension'][i]:.1f} N")
+    canvas.draw()
+    return Image.fromarray(np.array(canvas.buffer_rgba())).convert("RGB")

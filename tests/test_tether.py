@@ -1,0 +1,139 @@
+"""The tether: its law, its FMU, and a tow by three FMUs and a master."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from hovercraft_fmu.coupling import GAUSS_SEIDEL, JACOBI
+from hovercraft_fmu.fmu.python.wrapper import Fmi2Status
+from hovercraft_fmu.host import Fmu, SimulationError
+from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.dynamics import State
+from hovercraft_fmu.model.integrators import INTEGRATORS
+from hovercraft_fmu.model.subcycling import Settings
+from hovercraft_fmu.tether.line import Line, pull
+from hovercraft_fmu.tether.tether_package import build_tether
+from hovercraft_fmu.towing import BEND, COLUMNS, Tow, haul, haul_bare
+from tests.conftest import Built
+from tests.strategies import states
+
+BOTH = pytest.mark.parametrize("scheme", [JACOBI, GAUSS_SEIDEL])
+
+
+@pytest.fixture(scope="module")
+def tether(built: Built) -> Path:
+    return built("Tether.fmu", build_tether)
+
+
+# ---- the law
+
+
+@given(states, states)
+def test_force_and_moment_are_kept(first: State, second: State) -> None:
+    """What one craft gets the other one loses: to the bit, and of the moment about the origin to rounding."""
+    made = pull(first, second, Line(slack_length=1.0))
+    assert (made.first.x, made.first.y) == (-made.second.x, -made.second.y)
+    about = [on.moment + at.x * on.y - at.y * on.x for on, at in ((made.first, first), (made.second, second))]
+    assert sum(about) == pytest.approx(0.0, abs=1e-12 * (1.0 + made.tension * 4e3))  # positions to 1e3 m each way
+
+
+@given(states, states)
+def test_the_power_of_the_forces_is_that_of_the_line(first: State, second: State) -> None:
+    """-tension times the speed at which its ends part, by a difference of the distance over a microsecond."""
+    made = pull(first, second, Line(slack_length=0.0))
+    power = sum(
+        on.x * at.vx + on.y * at.vy + on.moment * at.yaw_rate
+        for on, at in ((made.first, first), (made.second, second))
+    )
+
+    def later(at: State, h: float) -> State:
+        return State(at.x + h * at.vx, at.y + h * at.vy, at.heading + h * at.yaw_rate, *at[3:])
+
+    h = 1e-6
+    ends = [pull(later(first, each), later(second, each), Line()).distance for each in (-h, h)]
+    speed = (ends[1] - ends[0]) / (2 * h)
+    assert power == pytest.approx(-made.tension * speed, rel=1e-4, abs=1e-4 * (1.0 + made.tension))
+
+
+def test_it_pulls_and_never_pushes() -> None:
+    line = Line(stiffness=4.0, damping=3.0, slack_length=10.0, first_x=0.0, second_x=0.0)
+    for distance, speed, expected in ((12.0, 0.0, 8.0), (12.0, 1.0, 11.0), (12.0, -1.0, 5.0), (12.0, -4.0, 0.0),
+                                      (10.0, 5.0, 0.0), (3.0, -9.0, 0.0)):  # fmt: skip
+        made = pull(State(), State(x=distance, vx=speed), line)
+        assert (made.first, made.second) == ((expected, 0.0, 0.0), (-expected, 0.0, 0.0))
+        assert (made.tension, made.distance) == (expected, distance)
+
+
+def test_where_the_ends_meet_there_is_no_force() -> None:
+    line = Line(slack_length=0.0, first_x=0.0, second_x=0.0)
+    made = pull(State(vx=-1.0), State(vx=1.0), line)
+    assert (*made.first, *made.second, made.tension, made.distance) == (0.0,) * 8
+
+
+def test_the_moment_is_that_of_the_end_of_the_line() -> None:
+    """Abeam of a craft that heads along x, at its bow: the arm is all of it."""
+    made = pull(State(), State(x=5.0, y=20.0), Line(10.0, 0.0, 10.0, 5.0, 0.0, 0.0, 0.0))
+    assert made.first == (0.0, 100.0, 500.0)
+    assert made.second == (0.0, -100.0, 0.0)
+
+
+# ---- the FMU
+
+
+@BOTH
+def test_three_fmus_have_the_bits_of_the_bare_functions(scheme: str, fmu: Path, tether: Path) -> None:
+    found = haul(BEND, fmu, tether, scheme=scheme, stop_time=20.0)
+    expected = haul_bare(BEND, scheme=scheme, stop_time=20.0)
+    for name in COLUMNS:
+        assert found[name].tolist() == expected[name].tolist(), name
+    assert found["tension"].max() > 5.0
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"stiffness": -1.0}, "stiffness = -1.0: must not be negative"),
+        ({"damping": -0.5}, "damping = -0.5: must not be negative"),
+        ({"slack_length": -2.0}, "slack_length = -2.0: must not be negative"),
+        ({"first.attachment.x": math.nan}, "first.attachment.x = nan: must be a finite number"),
+        ({"second.pose.x": math.inf}, "second.pose.x = inf: must be a finite number"),
+    ],
+)
+def test_a_line_that_cannot_be_is_refused_by_name(values: dict[str, float], said: str, tether: Path) -> None:
+    with Fmu(tether) as opened, opened.instance() as line, pytest.raises(SimulationError, match=said):
+        line.start(values)
+
+
+def test_a_force_without_end_is_refused_and_the_last_one_stands(tether: Path) -> None:
+    with Fmu(tether) as opened, opened.instance() as line:
+        line.start({"second.pose.x": 50.0})
+        before = line.port("tension").get()
+        line.port("stiffness").set([1e308])
+        with pytest.raises(SimulationError, match=r"first.external.force.x = .*: must be a finite number"):
+            line.step(0.0, 0.1)
+        assert line.port("tension").get() == before
+
+
+# ---- the tow
+
+
+@BOTH
+def test_momentum_is_kept_and_a_line_without_damping_gains_energy_as_the_theory_says(scheme: str) -> None:
+    """Two masses on a line that stays taut (it was pulled far), forces held over H: the amplitude of the oscillation
+    grows by H*w^2/4 a second, three times that where the force comes a step late (see studies/tow.py).
+    """
+    craft, stiffness, h = Craft(drag_coefficient=0.0), 8.0, 0.05
+    omega = math.sqrt(stiffness * 2.0 / craft.mass)
+    line = Line(stiffness, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    # about 100 m apart in rotation: simpler, a line without slack about its middle would pass through 0
+    tow = Tow(State(x=100.0, vx=1.0), State(vx=1.0), craft, line, ((0.0, 0.0, 0.0, 0.0),), h, 0.2 * math.pi / omega)
+    towed = haul_bare(tow, scheme=scheme, settings=Settings(h, RK4))
+    assert np.abs(towed["first.velocity.x"] + towed["second.velocity.x"] - 2.0).max() < 1e-12
+
+
+RK4 = next(each for each in INTEGRATORS if each.name == "rk4")
