@@ -349,7 +349,7 @@ def test_a_finger_holds_what_a_key_does(opened: Opened) -> None:
     assert made.evaluate("hovercraft.page.flight.inputs.port_thruster") == 0
 
 
-SIZES = [(360, 740), (768, 1024), (1920, 1080)]
+SIZES = [(360, 740, "dark"), (768, 1024, "light"), (1920, 1080, "dark")]
 CONTRAST = """(name) => {
     const light = (color) => {
         const canvas = document.createElement("canvas").getContext("2d");
@@ -372,8 +372,7 @@ FIELDS = """[...document.querySelectorAll("#panel :is(input, select, button, tex
     .filter((each) => each.checkVisibility()).map((each) => each.id)"""
 
 
-@pytest.mark.parametrize(("width", "height"), SIZES)
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("width", "height", "scheme"), SIZES)
 def test_it_is_legible(opened: Opened, width: int, height: int, scheme: str) -> None:
     """Nothing is wider than the screen or than its own place; contrast is as WCAG 2 wants it (4.5); all has a name."""
     made = opened("", (width, height), color_scheme=scheme)
