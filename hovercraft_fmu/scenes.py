@@ -265,6 +265,7 @@ VOYAGES: Mapping[str, Voyage] = MappingProxyType(
             Voyage("half_mass", "half the mass", {"mass": 50.0}),
             Voyage("double_mass", "twice the mass", {"mass": 200.0}),
             Voyage("crosswind", "a wind of 0.2 m/s, half the top speed, down the screen", {"wind.y": 0.2}),
+            Voyage("ice", "the preset ice at 2 m/s", {"air_density": preset("ice").air_density}, {"cruise_speed": 2.0}),
         )
     }
 )

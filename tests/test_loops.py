@@ -104,7 +104,7 @@ def test_the_fmus_give_the_bits_of_the_bare_functions(
     """Past the first waypoint. The native hovercraft has its own sine and cosine, whose last bits may be others."""
     passage = sail(name, each_fmu, autopilot, scheme=scheme, stop_time=340.0)
     bare = bare_functions(name, scheme)
-    assert passage["waypoint"][-1] == 2.0
+    assert passage["waypoint"][-1] >= 2.0
     if each_fmu == fmu:
         assert (passage.data == bare.data).all()
     else:
@@ -122,7 +122,7 @@ def test_a_craft_that_starts_elsewhere(fmu: Path, autopilot: Path) -> None:
 
 
 def test_what_cannot_be_is_refused(fmu: Path, autopilot: Path, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="voyage = 'nix': must be one of calm, half_mass, double_mass, crosswind"):
+    with pytest.raises(ValueError, match="voyage = 'nix': must be one of calm, half_mass, double_mass, crosswind, ice"):
         sail("nix", fmu, autopilot)
     with pytest.raises(ValueError, match="scheme = 'nix': must be one of jacobi, gauss_seidel"):
         sail("calm", fmu, autopilot, scheme="nix")
@@ -173,17 +173,22 @@ def test_the_command_writes_what_is_committed(tmp_path: Path) -> None:
     done = CliRunner().invoke(commands, ["measure", "coupling", "--quick", "--output", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "order in the communication step: jacobi 1.0" in done.output
-    for name in ("coupling.csv", "coupling_course.csv"):
+    for name, keys in (("coupling", 2), ("coupling_course", 5), ("coupling_limit", 4), ("coupling_voyages", 9)):
         ours, committed = (
-            list(csv.reader((folder / name).read_text(encoding="utf-8").splitlines())) for folder in (tmp_path, RESULTS)
+            list(csv.reader((folder / f"{name}.csv").read_text(encoding="utf-8").splitlines()))
+            for folder in (tmp_path, RESULTS)
         )
-        known = {tuple(row[:-1]): row[-1] for row in committed}
+        known = {tuple(row[:keys]): row[keys:] for row in committed}
         assert ours[0] == committed[0]
-        assert len(ours) > 6
-        for *row, found in ours[1:]:
-            before = known[tuple(row)]
+        assert len(ours) > 4
+        for row in ours[1:]:
             if "never" not in row:  # a craft that has lost its way may be anywhere
-                assert float(found) == pytest.approx(float(before), rel=0.02), row
+                before = known[tuple(row[:keys])]
+                assert list(map(float, row[keys:])) == pytest.approx(list(map(float, before)), rel=0.02), row
+    limit = list(csv.DictReader((tmp_path / "coupling_limit.csv").read_text(encoding="utf-8").splitlines()))
+    for each in limit:
+        assert float(each["measured"]) == pytest.approx(float(each["theory"]), rel=0.05)
+    assert (tmp_path / "coupling_limit.png").stat().st_size > 10000
     assert (tmp_path / "coupling.png").stat().st_size > 10000
 
 

@@ -17,6 +17,7 @@ from ..model.dynamics import Controls, State, derivatives
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..scenes import VOYAGES
+from . import step_limit, voyages
 from .laboratory import Findings, Shown, Tell, part
 from .reference_end import TOLERANCES
 from .work_precision import fitted
@@ -35,6 +36,9 @@ STEPS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)
 """s"""
 WHOLE_STEPS = (0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """s, for the whole course"""
+COURSES = (VOYAGE.name, "ice")
+COURSE = ("voyage", "scheme", "communication_step", "arrived", "missed", "at_limit", "cross_track_error")
+"""at_limit: % of the communication points with a thruster full on; cross_track_error: m, root mean square"""
 EXACT = Settings(0.05, integrator(3))
 """RK4: what is left is the coupling's error."""
 COMPARED = {
@@ -101,16 +105,17 @@ def errors(steps: Sequence[float], exact: Path2, tell: Tell) -> pl.DataFrame:
 
 
 def courses(steps: Sequence[float], tell: Tell) -> pl.DataFrame:
-    """Whether the craft still reaches every waypoint, and how well it holds the legs [m, root mean square]."""
+    """Whether the craft still comes to the end of the course, and how: columns COURSE."""
+    sailed = [(name, scheme, step) for name in COURSES for step in steps for scheme in SCHEMES]
     rows = []
-    for done, step in enumerate(steps, 1):
-        for scheme in SCHEMES:
-            passage = sail_bare(VOYAGE, scheme=scheme, communication_step=step, settings=EXACT)
-            arrived = f"{passage['time'][-1]:g} s" if passage.arrived else "never"
-            off = float(np.sqrt(np.mean(passage["cross_track_error"] ** 2)))
-            rows.append((scheme, step, arrived, off))
-        tell(done / len(steps))
-    return pl.DataFrame(rows, ("scheme", "communication_step", "arrived", "cross_track_error"), orient="row")
+    for done, (name, scheme, step) in enumerate(sailed, 1):
+        passage = sail_bare(name, scheme=scheme, communication_step=step, settings=EXACT)
+        arrived = f"{passage['time'][-1]:g} s" if passage.arrived else "never"
+        off = float(np.sqrt(np.mean(passage["cross_track_error"] ** 2)))
+        full = np.maximum(passage["port_thruster"], passage["starboard_thruster"]) >= 1.0
+        rows.append((name, scheme, step, arrived, int(passage["missed"][-1]), 100.0 * float(full.mean()), off))
+        tell(done / len(sailed))
+    return pl.DataFrame(rows, COURSE, orient="row")
 
 
 def order(found: pl.DataFrame, error_of: str) -> float:
@@ -123,16 +128,16 @@ def measure(quick: bool, tell: Tell) -> Findings:
     """The errors of a stretch and the whole course; quick: fewer communication steps."""
     exact, off = continuous()
     steps, whole = (STEPS[3:], WHOLE_STEPS[2:5]) if quick else (STEPS, WHOLE_STEPS)
-    found = errors(steps, exact, part(tell, 0.0, 0.7))
-    course = courses(whole, part(tell, 0.7, 1.0))
+    found = errors(steps, exact, part(tell, 0.0, 0.2))
+    course = courses(whole, part(tell, 0.2, 0.5))
     half = {error_of: error for error_of, step, error in found.iter_rows() if step == VOYAGE.communication_step}
     schemes = ", ".join(f"{scheme} {order(found, scheme):.2f}" for scheme in SCHEMES)
     wide = found.pivot("error_of", index="communication_step", values="position_error")
-    return Findings(
+    findings = Findings(
         {"coupling": found, "coupling_course": course},
         [
             Shown(f"The largest position error [m] in the first {STRETCH:g} s of '{VOYAGE.name}'", wide),
-            Shown(f"The whole course of '{VOYAGE.name}'", course),
+            Shown("Whole courses: thrusters at their limit [%], off the legs [m, root mean square]", course),
         ],
         {"coupling": draw(found)},
         [
@@ -140,6 +145,9 @@ def measure(quick: bool, tell: Tell) -> Findings:
             f"{half[JACOBI] / half[GAUSS_SEIDEL]:.2f} times as much; the continuous loop is known to {off:.1g} m"
         ],
     )
+    findings.add(step_limit.measure(quick, part(tell, 0.5, 0.6)))
+    findings.add(voyages.measure(quick, part(tell, 0.6, 1.0)))
+    return findings
 
 
 def draw(found: pl.DataFrame) -> "Figure":
