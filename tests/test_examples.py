@@ -18,7 +18,7 @@ from tests.conftest import Fresh
 
 HERE = Path(hovercraft_fmu.examples.__file__).parent
 PRINTED = {
-    "fmpy_alone": r"^\(\d+\.\d+, -?\d+\.\d+\) m, -?\d+\.\d deg\n$",
+    "fmpy_alone": r"\A\(\d+\.\d+, -?\d+\.\d+\) m, -?\d+\.\d deg\n$",
     "one_run": r"error, as told .*\n(.*\n)+the cheapest way to a millimetre on a slalom: \w+, \S+ s\n$",
     "sweep_in_pandas": r"mass  .*\n",
     "many_craft": r"^set aside by \d+\.\d\d m where light, by \d+\.\d\d m where heavy; 0 were refused\n$",

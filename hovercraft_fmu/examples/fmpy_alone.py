@@ -3,13 +3,15 @@
 import fmpy
 import numpy as np
 
-# inputs are linear between rows; two rows at one time are a jump
+# inputs are linear between rows, two rows at one time are a jump; a column for each, as fmpy warns of others
 names = ["time", "thrust", "port_thruster", "starboard_thruster", "wind.x", "wind.y"]
-wind = (0.0, 0.05)  # m/s, in x and y
-rows = [(0, 8, 0, 0, *wind), (10, 8, 0, 0, *wind), (10, 8, 1, 0, *wind), (13, 8, 1, 0, *wind), (13, 8, 0, 0, *wind)]
+names += ["external.force.x", "external.force.y", "external.moment"]
+inputs = np.zeros(5, dtype=[(name, float) for name in names])
+inputs["time"], inputs["port_thruster"] = [0, 10, 10, 13, 13], [0, 0, 1, 1, 0]
+inputs["thrust"], inputs["wind.y"] = 8, 0.05
 result = fmpy.simulate_fmu(
     "build/HovercraftNative.fmu",
-    input=np.array(rows, dtype=[(name, float) for name in names]),
+    input=inputs,
     start_values={"mass": 120.0, "integrator": 3, "step_size": 0.1},
     output=["pose.x", "pose.y", "pose.heading", "warnings"],
     output_interval=0.1,  # the communication step
