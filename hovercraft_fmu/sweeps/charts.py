@@ -24,6 +24,8 @@ PATHS = 1000
 """More of them are only ink."""
 PANEL = (4.4, 3.6)
 """Inches."""
+MOST_TICKS = 5
+"""Of a panel, across: with more their numbers touch."""
 FEW = 200
 """Points up to which each has a marker of its own."""
 
@@ -86,6 +88,7 @@ def _panels(
     for axes, (name, over) in zip(grid.flat, panels, strict=False):
         axes.set_xlabel(_label(over[0]))
         draw(axes, table[name], *(table[each] for each in over))
+        axes.locator_params(axis="x", nbins=MOST_TICKS)
         if len(over) > 1:
             axes.set_ylabel(_label(over[1]))
             axes.set_title(_label(name))

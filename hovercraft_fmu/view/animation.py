@@ -3,7 +3,7 @@
 import importlib
 import os
 from collections.abc import Callable, Sequence
-from math import ceil, cos, floor, hypot, nan, pi, sin
+from math import ceil, cos, floor, hypot, log10, nan, pi, sin
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -166,6 +166,19 @@ def _frames(tracks: Sequence[Track]) -> NDArray[np.int_]:
     time = tracks[0].result["time"]
     wanted = np.linspace(time[0], time[-1], min(FRAMES, len(time)))
     chosen: NDArray[np.int_] = np.unique(np.searchsorted(time, wanted - 1e-9 * (time[-1] - time[0])))
+    return chosen
+
+
+def _round_frames(tracks: Sequence[Track]) -> NDArray[np.int_]:
+    """Those of a page, whose slider has round numbers: communication points at multiples of 1, 2 or 5 times a power of
+    ten [s], as many as FRAMES at most, and the end."""
+    time = tracks[0].result["time"]
+    least = max(float(time[-1] - time[0]) / FRAMES, float(np.diff(time).max()))
+    power = 10.0 ** floor(log10(least))
+    step = next(each * power for each in (1, 2, 5, 10) if each * power >= 0.999999 * least)
+    wanted = step * np.arange(ceil(time[0] / step), floor(time[-1] / step) + 1)
+    places = np.clip(np.searchsorted(time, wanted - 0.5 * np.diff(time).max()), 0, len(time) - 1)
+    chosen: NDArray[np.int_] = np.unique(np.append(places, len(time) - 1))
     return chosen
 
 
@@ -362,7 +375,7 @@ def _write_page(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
         line = {"x": tracks[0].result["time"][kept], "y": apart(tracks)[kept]}
         figure.add_trace(graphs.Scatter(**line, showlegend=False, line_color=QUIET, hovertemplate=POINTED_AT), 1, 2)
     fixed = len(figure.data)
-    chosen = _frames(tracks)
+    chosen = _round_frames(tracks)
     for trace, column in _moving_traces(tracks, chosen[0]):
         figure.add_trace(graphs.Scatter(**trace), 1, column)
     moving = list(range(fixed, len(figure.data)))
