@@ -18,6 +18,7 @@ from PIL import Image
 
 from hovercraft_fmu.autopilot.guidance import Orders
 from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
+from hovercraft_fmu.building import build
 from hovercraft_fmu.building.ssp import build_ssp
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.coupling import (
@@ -119,6 +120,17 @@ def test_a_craft_that_starts_elsewhere(fmu: Path, autopilot: Path) -> None:
     assert (passage.data == bare.data).all()
     assert passage["cross_track_error"][0] == 0.0
     assert passage["distance"][0] == pytest.approx(math.hypot(60.0, 20.0))
+
+
+def test_an_fmu_with_start_values_of_its_own_is_handed_over_in_initialization_mode(
+    autopilot: Path, tmp_path: Path
+) -> None:
+    """Where it is, and what it is: the first leg begins there, and the gains are those of its mass."""
+    there = {"pose.x": 50.0, "pose.y": 50.0, "mass": 300.0, "inertia": 1500.0}
+    own = build("python", tmp_path / "There.fmu", name="There", start_values=there)
+    passage = sail("calm", own, autopilot, stop_time=20.0)
+    assert passage["cross_track_error"][0] == 0.0
+    assert (passage.data == sail_bare(Voyage("there", "", there), stop_time=20.0).data).all()
 
 
 def test_what_cannot_be_is_refused(fmu: Path, autopilot: Path, tmp_path: Path) -> None:
