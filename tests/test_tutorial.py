@@ -21,6 +21,7 @@ PRINTED = (
     r"end: \(.*\) m",
     r"200 kg: .* in a minute",
     r"^\d\.\d+ m at most; 0 were refused",
+    r"^bounced off at -0\.\d+ m/s and .* rad/s: (49|50|51)\.\d J of 50 J",
     r"arrived: True",
     r"after 500 s: .* off the leg",
     r"after 120 s",
@@ -52,6 +53,14 @@ def test_its_first_sections_run_with_fmi_3(number: int, native3_fmu: Path, fresh
     (tmp_path / "build").mkdir()
     shutil.copy(native3_fmu, tmp_path / "build" / native3_fmu.name)
     assert re.search(PRINTED[number], fresh(BLOCKS[number].replace("HovercraftNative.fmu", native3_fmu.name)))
+
+
+@pytest.mark.once
+def test_the_wall_warns_of_a_step_that_is_too_long_for_it(native_fmu: Path, fresh: Fresh, tmp_path: Path) -> None:
+    (tmp_path / "build").mkdir()
+    shutil.copy(native_fmu, tmp_path / "build")
+    (code,) = [block for block in BLOCKS if "wall" in block]
+    assert "the step of 0.1 s is too long for this wall" in fresh(code.replace("50.0, 0.01", "50.0, 0.1"))
 
 
 TOOLS = pages(NATIVE)["tools.html"]

@@ -17,7 +17,7 @@ from ..model.dynamics import Controls, State, derivatives
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..scenes import VOYAGES
-from . import step_limit, voyages
+from . import step_limit, tow, voyages
 from .laboratory import Findings, Shown, Tell, part
 from .reference_end import TOLERANCES
 from .work_precision import fitted
@@ -146,7 +146,8 @@ def measure(quick: bool, tell: Tell) -> Findings:
         ],
     )
     findings.add(step_limit.measure(quick, part(tell, 0.5, 0.6)))
-    findings.add(voyages.measure(quick, part(tell, 0.6, 1.0)))
+    findings.add(voyages.measure(quick, part(tell, 0.6, 0.95)))
+    findings.add(tow.measure(quick, part(tell, 0.95, 1.0)))
     return findings
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..coupling import GAUSS_SEIDEL, JACOBI
 from ..drawing.figures import new_figure
-from ..drawing.palette import INK, OTHER, QUIET, SEA
+from ..drawing.palette import INK, OTHER, SEA
 from ..host.fleet import Crafts, advance_fleet
 from ..model.dynamics import State
 from ..model.integrators import integrator
@@ -173,8 +173,8 @@ def measure(quick: bool, tell: Tell) -> Findings:
     limit = limits(chosen, tell)
     theory = [limit_of_theory(s, z) for s, z in zip(chosen.scheme.tolist(), chosen.damping.tolist(), strict=True)]
     ratio = chosen.first / chosen.second
-    found = pl.DataFrame({"scheme": chosen.scheme.tolist(), "damping_ratio": chosen.damping,
-                          "stiffness": chosen.stiffness, "mass_ratio": ratio, "limit": limit, "theory": theory})  # fmt: skip
+    found = pl.DataFrame({"scheme": chosen.scheme.tolist(), "damping_ratio": chosen.damping, "limit": limit,
+                          "stiffness": chosen.stiffness, "mass_ratio": ratio, "theory": theory})  # fmt: skip
     steps = [(s, a) for s in SCHEMES for a in STEPS]
     free = cases((0.0,), LINES[:1], [s for s, _ in steps])
     a = np.array([step for _, step in steps])
@@ -223,11 +223,12 @@ def draw(found: pl.DataFrame, grown: pl.DataFrame) -> "Figure":
         rates.loglog(own["step"], own["growth"], color=color, marker=marker, linestyle="none", label=scheme)
         rates.loglog(steps, [np.log(np.abs(roots(scheme, a, 0.0)).max()) / a for a in steps.tolist()], color=color,
                      linewidth=1.0)  # fmt: skip
+    rates.set_xticks(STEPS, list(map(str, STEPS)))
+    rates.minorticks_off()
     rates.set_xlabel("H*w")
     rates.set_ylabel("growth of the amplitude / w")
     rates.set_title("Without damping; by derivatives: none", loc="left")
     for axes in (chart, rates):
         axes.grid(which="major", alpha=0.3)
         axes.legend(frameon=False, fontsize="small")
-    rates.axhline(1e-4, color=QUIET, linewidth=0.0)
     return figure
