@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .autopilot.guidance import Commands, Orders, Sight, Waypoint, beginning, steer
-from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, ORDERS
+from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, ORDERS, STATUS
 from .building import default_fmu
 from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, STATES, WIND
 from .fmu.near_names import did_you_mean, must_be_one_of
@@ -64,6 +64,18 @@ class Passage:
     def arrived(self) -> bool:
         """Whether all waypoints were reached."""
         return bool(self["arrived"][-1])
+
+    @property
+    def reached(self) -> int:
+        """How many waypoints; those that were missed are none of them."""
+        passed = int(self["waypoint"][-1]) if self.arrived else int(self["waypoint"][-1]) - 1
+        return passed - int(self["missed"][-1])
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What the autopilot said, one text for each bit of its last status."""
+        status = int(self["status"][-1])
+        return tuple(text for bit, text in STATUS.items() if status & bit)
 
     @property
     def craft(self) -> Craft:

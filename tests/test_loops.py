@@ -16,8 +16,8 @@ from click.testing import CliRunner
 from lxml import etree
 from PIL import Image
 
-from hovercraft_fmu.autopilot.guidance import Orders
-from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
+from hovercraft_fmu.autopilot.guidance import ARRIVED, Orders
+from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, STATUS
 from hovercraft_fmu.building import build
 from hovercraft_fmu.building.ssp import build_ssp
 from hovercraft_fmu.cli import commands
@@ -66,6 +66,7 @@ def assert_arrived(passage: Passage) -> None:
     assert [passage[name][-1] for name in COMMANDS] == [0.0, 0.0, 0.0]
     assert not np.any(passage["port_thruster"] * passage["starboard_thruster"])
     assert passage.distance > 25.0 * passage.craft.length
+    assert (passage.reached, passage.told) == (6, (STATUS[ARRIVED],))
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -105,8 +105,9 @@ def _print_passage(passage: "Passage") -> None:
     print_rows(
         f"{passage.voyage.name}: {passage.voyage.description}",
         {
-            "waypoints reached": f"{int(passage['waypoint'][-1]) - (not passage.arrived)} of {len(passage.waypoints)}",
+            "waypoints reached": f"{passage.reached} of {len(passage.waypoints)}",
             "arrived": arrived,
+            "told": "; ".join(passage.told) or "nothing",
             "distance": f"{distance:.2f} m, {distance / passage.craft.length:.1f} craft lengths",
             "off the legs": f"{off.mean():.2f} m in the mean, {off.max():.2f} m where a leg begins",
         },

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 
 import polars as pl
 
+from ..autopilot.guidance import ARRIVED
 from ..autopilot.pilot_interface import STATUS
-from ..coupling import JACOBI, Passage, sail_bare
+from ..coupling import JACOBI, sail_bare
 from ..model.craft import preset
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
@@ -48,12 +49,6 @@ def voyages() -> Iterator[tuple[Voyage, str, float, int]]:
         yield Voyage(f"{number}", "", craft, {"cruise_speed": speed}, step, STOP), air, wind, side
 
 
-def told(passage: Passage) -> str:
-    """The bits of its status in words, but for the arrival."""
-    status = int(passage["status"][-1])
-    return "; ".join(text.split(":")[0] for bit, text in STATUS.items() if status & bit & ~1) or "-"
-
-
 def measure(quick: bool, tell: Tell) -> Findings:
     """The table; quick: every eleventh of them."""
     chosen = [each for number, each in enumerate(voyages()) if not quick or number % 11 == 5]
@@ -61,10 +56,11 @@ def measure(quick: bool, tell: Tell) -> Findings:
     for done, (voyage, air, wind, side) in enumerate(chosen, 1):
         passage = sail_bare(voyage, scheme=JACOBI, settings=SETTINGS)
         arrived = f"{passage['time'][-1]:g} s" if passage.arrived else "no"
+        told = "; ".join(text.split(":")[0] for text in passage.told if text != STATUS[ARRIVED]) or "-"
         off = float((passage["cross_track_error"] ** 2).mean() ** 0.5)
         rows.append(
             (int(voyage.name), air, voyage.craft["mass"], wind, 360 * side // SIDES, voyage.communication_step, arrived,
-             int(passage["missed"][-1]), told(passage), off)
+             int(passage["missed"][-1]), told, off)
         )  # fmt: skip
         tell(done / len(chosen))
     columns = (
