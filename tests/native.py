@@ -39,7 +39,7 @@ C_INCLUDES = ("-I", str(Path(elsewhere.__file__).parent))
 """Of the calls of both standards."""
 OUTCOMES = ("advanced", "too many sub-steps", "not finite", "step too small")
 NO_RAMP = Controls(0.0)
-STEPS = {"semi_implicit_euler": 0.01, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05, "splitting": 0.1}
+STEPS = {"semi_implicit_euler": 0.01, "drag_implicit": 0.02, "rk4": 0.1, "adaptive": 0.05, "splitting": 0.05}
 """s: a sub-step for each method, with which none of the scenes warns"""
 IN_TURN = dict(zip(SCENES, itertools.cycle(STEPS), strict=False))
 """A method for every scene."""

@@ -37,6 +37,7 @@ from hovercraft_fmu.studies.extremes import (
     sample,
     shares,
 )
+from hovercraft_fmu.studies.limits import OFF, RIGHT, drawn, outcome
 from hovercraft_fmu.studies.stability import QUALITIES, THEORY, Motion, largest_step, motions
 from tests.lowlevel import another, count, get, one, reference
 from tests.test_trade import RESULTS, records
@@ -113,6 +114,19 @@ def test_not_everything_warns(extremes: list[dict[str, Any]]) -> None:
             assert share["failed"] == 0.0
         elif not own:
             assert share["failed"] > 0.1
+
+
+@FIXED_STEP
+def test_a_warning_means_something(method: Any) -> None:
+    """Of the runs that are off 95 % are warned, of the warned a quarter is right; 1500 runs of another seed than those
+    that the limits were fitted on: of some 250 that are off a percent and a half is scatter.
+    """
+    found = outcome(drawn(3, 1500, method), method)
+    assert np.mean(found.error > OFF) > 0.05
+    assert 0.4 < np.mean(found.error < RIGHT) < 0.6
+    caught, right = found.warned(method.stability_limit, method.rotation_limit)
+    assert caught > 0.95 - 0.03
+    assert right < 0.25 + 0.03
 
 
 @settings(max_examples=40)
@@ -357,7 +371,7 @@ def slalom(step: float) -> list[Controls]:
 
 @EVERY
 def test_four_hours_of_slalom(method: Any) -> None:
-    """Finite, never a warning, never faster than its forces allow, and the same mean speed with every method."""
+    """Finite, never faster than its forces allow, and the same mean speed with every method."""
     step = STEP if method.integrate else 10 * STEP
     craft, minute = SCENES["slalom"].craft, slalom(step)
     way, state, proposed = Settings(step, method, 1e-4), State(), 0.0
@@ -368,7 +382,7 @@ def test_four_hours_of_slalom(method: Any) -> None:
         speed = math.hypot(state.vx, state.vy)
         fastest, total = max(fastest, speed), total + speed
     assert all(map(math.isfinite, state))
-    assert stability < method.stability_limit
+    assert stability < (1.6 if method.integrate else math.inf)
     assert rotation < method.rotation_limit
     # 10 N ahead and 3 N abeam at most; the drag point may be slower than the craft that swings about it, by little
     assert fastest < 1.1 * math.sqrt(13.0 / craft.drag_factor)

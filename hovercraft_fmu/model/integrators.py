@@ -570,8 +570,8 @@ INTEGRATORS = (
         1,
         1,
         1,
-        2.0,
-        0.5,
+        0.2,
+        0.15,
     ),
     Integrator(
         "drag_implicit",
@@ -580,10 +580,10 @@ INTEGRATORS = (
         1,
         1,
         1,
-        2.0,  # it never diverges, but under thrust it overshoots above
-        0.5,
+        2.0,
+        0.2,
     ),
-    Integrator("rk4", "The classic Runge-Kutta method: fourth order", rk4, 4, 4, 3, 2.785, 0.5),
+    Integrator("rk4", "The classic Runge-Kutta method: fourth order", rk4, 4, 4, 3, 2.0, 3.3),
     Integrator(
         "adaptive",
         "Dormand-Prince 5(4) with steps that meet the tolerance; step_size is the first one",
@@ -601,8 +601,8 @@ INTEGRATORS = (
         2,
         2,
         1,
-        2.0,
-        0.5,
+        1.0,
+        1.5,
     ),
 )
 

@@ -97,8 +97,8 @@ def judged(runs: Runs, method: Integrator) -> pl.DataFrame:
     fixed = method is not ADAPTIVE
     settings = Settings(runs.h if fixed else 0.1, method, 1e-6 if fixed else runs.h)
     half = settings._replace(step_size=0.5 * runs.h) if fixed else settings._replace(tolerance=runs.h / TIGHTER)
-    craft, beside = _Lane(runs, settings), _Lane(runs, half, 1 if fixed else 2)
-    exact, near = (_Lane(runs, Settings(0.01, ADAPTIVE, part * REFERENCE)) for part in (0.1, 1.0))
+    craft, beside = Lane(runs, settings), Lane(runs, half, 1 if fixed else 2)
+    exact, near = (Lane(runs, Settings(0.01, ADAPTIVE, part * REFERENCE)) for part in (0.1, 1.0))
     estimate, quiet = np.zeros(len(runs.h)), np.ones(len(runs.h), bool)
     crafts, companions = [runs.crafts.one(i) for i in range(len(runs.h))], [Companion(State())] * len(runs.h)
     for controls in runs.controls:
@@ -118,7 +118,7 @@ def judged(runs: Runs, method: Integrator) -> pl.DataFrame:
     return pl.DataFrame(found)
 
 
-class _Lane:
+class Lane:
     """Craft that go along; one that left the range of numbers is NaN."""
 
     def __init__(self, runs: Runs, settings: Any, parts: int = 1) -> None:
@@ -127,6 +127,7 @@ class _Lane:
         self.stability, self.rotation, self.substeps, self._proposed = np.zeros((4, len(runs.h)))
 
     def go(self, controls: Controls) -> None:
+        """A communication step further."""
         runs, step = self._runs, self._runs.duration / self._parts
         for _ in range(self._parts):
             made: Fleet = advance_fleet(

@@ -70,6 +70,7 @@ from ..model.dynamics import Controls, State
 from ..model.integrators import Integrator
 from .extremes import BATCH, FIXED, Array, Batch, Mask, advanced, chosen, made, measure_extremes, shares
 from .laboratory import Findings, Shown, Tell, part
+from .limits import SAMPLING, measure_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -233,15 +234,18 @@ def measure(quick: bool, tell: Tell) -> Findings:
     whole = motions()
     if quick:
         whole = tuple(motion._replace(crafts=chosen(motion.crafts, slice(0, 2))) for motion in whole[:2])
-    limits = measure_map(whole, part(tell, 0.0, 0.5))
+    limits = measure_map(whole, part(tell, 0.0, 0.4))
     runs, size = (1024, 256) if quick else (65536, BATCH)
-    extremes = measure_extremes(runs, size=size, tell=part(tell, 0.5, 1.0))
+    extremes = measure_extremes(runs, size=size, tell=part(tell, 0.4, 0.9))
+    warnings = measure_limits(1000 if quick else 6000, part(tell, 0.9, 1.0))
     rows = shares(extremes)
     figure = new_figure(figsize=(10.0, 4.6), dpi=75, layout="constrained")
     draw(figure, extremes)
     title = "The largest dimensionless step (h*kappa*v0 coasting, h*kappa*v_t under thrust)"
-    tables = [Shown(title, limits), Shown("Random extremes; shares of the runs", rows)]
-    return Findings({"stability": limits, "extremes": rows}, tables, {"stability": figure})
+    tables = [Shown(title, limits), Shown("Random extremes; shares of the runs", rows),
+              Shown("When the FMU warns", warnings)]  # fmt: skip
+    records = {"stability": limits, "extremes": rows, "warnings": warnings}
+    return Findings(records, tables, {"stability": figure}, [SAMPLING])
 
 
 NOTES = (
