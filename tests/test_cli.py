@@ -256,6 +256,7 @@ def test_list_scenes(shell: Shell) -> None:
         (("simulate", "--plot", "a.txt"), "plot = 'a.txt': must end in .png, .svg or .pdf"),
         (("sweep", "turning_circle", "--plot", "a.txt"), "plot = 'a.txt': must end in .png"),
         (("sweep", "turning_circl"), "did you mean 'turning_circle'?"),
+        (("measure", "trad"), "measurement = 'trad': must be one of trade, .*; did you mean 'trade'?"),
         (("simulate", "--preset", "moon"), "preset = 'moon': must be one of textbook, ice"),
         (("validate", "nix.fmu", "--quiet"), "not valid: 1 of 1 file, 1 problem found"),
     ],

@@ -28,7 +28,7 @@ MEASURE += "\n".join(f"  {name:12} {each.what} ({each.takes})" for name, each in
 
 
 @click.command(help=MEASURE)
-@click.argument("name", metavar="NAME", type=click.Choice(list(MEASUREMENTS)))
+@click.argument("name", metavar="NAME", type=NameOf(lambda: MEASUREMENTS))
 @click.option("--quick", is_flag=True, help="Fewer cases: below half a minute.")
 @click.option(
     "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR", help="Default: build/measure/NAME."

@@ -9,13 +9,16 @@ from typing import ParamSpec, TypeVar
 
 from .interface import BY_NAME
 
+NEAR = 0.75
+"""difflib's measure from 0 to 1: what is less alike was hardly meant."""
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """'; did you mean "mass"?', or nothing where no name is near."""
-    near = get_close_matches(str(name).lower(), {each.lower(): each for each in known}, n=1)
+    known = tuple(known)
+    near = get_close_matches(str(name).lower(), {each.lower(): each for each in known}, n=1, cutoff=NEAR)
     found = next((each for each in known if near and each.lower() == near[0]), None)
     return f"; did you mean {found!r}?" if found else ""
 
@@ -29,7 +32,7 @@ def must_be_one_of(what: str, name: object, known: Iterable[str]) -> str:
 def beside(path: Path) -> str:
     """What a file that is not there may have meant: a file of its folder that has nearly its name."""
     try:
-        names = [each.name for each in path.parent.iterdir()]
+        names = [each.name for each in path.parent.iterdir() if each.name != path.name]
     except OSError:
         return ""
     return did_you_mean(path.name, names)
