@@ -239,13 +239,15 @@ def first_order_bound(seen: Numbers, runs: Batch) -> Array:
 def higher_order_bound(order: int, seen: Numbers, runs: Batch) -> Array:
     """1, of V: N*lambda*eps^order + s*sigma*eps^2, lambda = s*sigma + rho + sqrt(tau), eps = lambda + alpha + phi.
 
-    With the directional area, s*sigma*eps more; with friction, the bound of first order.
+    With the directional area, and of second order with rotational drag, s*sigma*eps more; with friction, that of first
+    order.
     """
     drag = _aspect(runs) * seen.sigma
     rate = drag + seen.rho + np.sqrt(seen.tau)
     eps = rate + seen.alpha + seen.phi
     smooth = runs.substeps * rate * eps**order + drag * eps**2
-    kinks = np.where(runs.craft.drag_area == DIRECTIONAL, drag * eps, 0.0)
+    has_kinks = (runs.craft.drag_area == DIRECTIONAL) | ((runs.craft.rotational_drag > 0.0) & (order == 2))
+    kinks = np.where(has_kinks, drag * eps, 0.0)
     rest = np.where(runs.craft.skirt_friction > 0.0, first_order_bound(seen, runs), 0.0)
     return smooth + kinks + rest
 

@@ -38,7 +38,8 @@ two motions never drift apart by it, and local errors add up without growing.
 - First order: a sub-step leaves h^2/2*|v''|. Drag and direction change by delta = sigma + rho + tau of themselves, what
   they act on by delta + alpha of V. So the error is at most C*N*delta*(delta + alpha)*V, where C = 1/2 is Taylor's.
 - Splitting: with the rates of RK4, below: lambda*eps^2*V a sub-step; where the drag point passes through rest, once,
-  sigma*eps^2*V. So the error is at most C*(N*lambda + sigma)*eps^2*V.
+  sigma*eps^2*V. So the error is at most C*(N*lambda + sigma)*eps^2*V. Rotational drag, which it takes half before and
+  half after, costs sigma*eps*V where the yaw rate passes through 0.
 - RK4: rates lambda = sigma + rho + sqrt(tau), and eps = lambda + alpha: lambda*eps^4*V a sub-step; and where the drag
   point passes through rest q has a kink, and one sub-step errs by sigma*eps^2*V, of third order. So the error is
   at most C*(N*lambda*eps^4 + sigma*eps^2)*V. (sqrt(tau) is the rate at which the craft swings about its course, as a
