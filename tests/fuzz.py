@@ -1,4 +1,7 @@
-"""python -m tests.fuzz [SECONDS]: any sequence of FMI calls on sanitized native FMUs, by default ten minutes each."""
+"""python -m tests.fuzz ATTACK [N]: calls, extremes, standards, signals, files.
+
+calls: any sequence of FMI calls on sanitized native FMUs, N seconds (600) each; the others are in attacks.py, N times.
+"""
 
 import os
 import shutil
@@ -6,8 +9,10 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from time import perf_counter
 
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
+from tests import attacks
 from tests.native import C_INCLUDES, C_TESTS, written_sources
 
 SANITIZE = ("-g", "-fsanitize=fuzzer,address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
@@ -50,11 +55,25 @@ def fuzz(program: Path, limit: str, **env: str) -> str:
     return done.stderr
 
 
-if __name__ == "__main__":
+def calls(seconds: int) -> str:
+    """Of both standards; what libFuzzer says of each."""
     if missing():
         sys.exit(missing())
-    seconds = int(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT
+    said = []
     for each in (NATIVE, NATIVE3):
         with tempfile.TemporaryDirectory() as place:
             program = compiled(written_sources(Path(place), each), each, LONG)
-            print(fuzz(program, f"-max_total_time={seconds}"))
+            said.append(fuzz(program, f"-max_total_time={seconds}"))
+    return "\n".join(said)
+
+
+if __name__ == "__main__":
+    table = {"calls": (calls, DEFAULT), **attacks.ATTACKS}
+    name = sys.argv[1] if len(sys.argv) > 1 else ""
+    if name not in table:
+        sys.exit(f"attack = {name!r}: must be one of {', '.join(table)}")
+    attack, usual = table[name]
+    begun = perf_counter()
+    print(
+        f"{name}: {attack(int(sys.argv[2]) if len(sys.argv) > 2 else usual)}; {(perf_counter() - begun) / 60:.1f} min"
+    )

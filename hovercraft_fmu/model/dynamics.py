@@ -290,6 +290,11 @@ def sliding_load_function(
     return loads_at
 
 
+def over_zero(value: float) -> float:
+    """value/0 as C has it, where a divisor that is greater than 0 is too small for a double: Python raises."""
+    return math.nan if value == 0.0 or value != value else math.copysign(math.inf, value)
+
+
 def friction_gains(craft: Craft, h: float) -> tuple[float, float]:
     """m/s: how much of v, and of rho*r, friction can take away in the time h [s]: F_max*h/m and F_max*rho^2*h/I."""
     radius = friction_radius(craft)
@@ -324,13 +329,18 @@ def friction_function(craft: Craft, h: float) -> Friction:
             q = 0.0
         for _ in range(NEWTON):
             of_v, of_r = q + a, q + b
-            part_v, part_r = straight / (of_v * of_v), turned / (of_r * of_r)
+            square_v, square_r = of_v * of_v, of_r * of_r
+            part_v = straight / square_v if square_v else over_zero(straight)
+            part_r = turned / square_r if square_r else over_zero(turned)
             size = part_v + part_r
-            new = q + size * (sqrt(size) - 1.0) / (part_v / of_v + part_r / of_r)
+            beyond = size * (sqrt(size) - 1.0)
+            slope = (part_v / of_v if of_v else over_zero(part_v)) + (part_r / of_r if of_r else over_zero(part_r))
+            new = q + (beyond / slope if slope else over_zero(beyond))
             if not new > q:
                 break
             q = new
-        of_v, of_r = q / (q + a), q / (q + b)
+        of_v, of_r = q + a, q + b
+        of_v, of_r = q / of_v if of_v else over_zero(q), q / of_r if of_r else over_zero(q)
         return vx * of_v, vy * of_v, yaw_rate * of_r
 
     return rubbed

@@ -16,6 +16,7 @@ from .dynamics import (
     friction_gains,
     friction_radius,
     load_function,
+    over_zero,
     pushed,
     sliding_load_function,
     slip_speed,
@@ -181,8 +182,12 @@ def drag_implicit(state: State, controls: Controls, craft: Craft, h: float, n: i
         determinant = mass * damped + g * (damped + arm)
         kept = mass / (mass + g)
         surge = h * ahead / (mass + g)
-        sway = ((damped + g * square) * (h * abeam) + g * x_d * (x_d * (g * kept) * v - b)) / determinant
-        yaw_rate = (mass * b - g * e) / determinant
+        sway = (damped + g * square) * (h * abeam) + g * x_d * (x_d * (g * kept) * v - b)
+        yaw_rate = mass * b - g * e
+        if determinant:
+            sway, yaw_rate = sway / determinant, yaw_rate / determinant
+        else:
+            sway, yaw_rate = over_zero(sway), over_zero(yaw_rate)
         vx = kept * vx + (c * surge - s * sway)
         vy = kept * vy + (s * surge + c * sway)
         if in_wind:
@@ -493,7 +498,8 @@ def _reach_function(craft: Craft, tolerance: float) -> Callable[[Vector, Vector]
             return False, math.inf
         gain = (y[3] * rates[3] + y[4] * rates[4] + radius * turning * rates[5]) / speed
         # its direction goes back to that of the motion at the rate `fastest / speed`: longer steps were not stable
-        longest = speed / max(fastest, NEAR_REST * -gain)
+        rate = max(fastest, NEAR_REST * -gain)
+        longest = speed / rate if rate else over_zero(speed)
         return longest > MIN_STEP, longest
 
     return reach
