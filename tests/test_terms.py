@@ -26,13 +26,13 @@ from hovercraft_fmu.model.dynamics import (
     loads,
     slip_speed,
 )
-from hovercraft_fmu.model.integrators import INTEGRATORS, integrator, integrator_number
+from hovercraft_fmu.model.integrators import ADAPTIVE, INTEGRATORS, integrator, integrator_number
 from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.studies import scene_terms
 from hovercraft_fmu.studies.reference_end import reference_end
 from hovercraft_fmu.studies.scene_terms import TERMS
-from hovercraft_fmu.studies.work_precision import Setting, largest, reached
+from hovercraft_fmu.studies.work_precision import off_at_the_end
 from tests.strategies import calm_controls, calm_crafts, controls, numbers, states
 from tests.test_trade import RESULTS, records
 
@@ -304,21 +304,21 @@ def test_what_friction_does_to_the_order() -> None:
     errors; adaptive follows its tolerance.
     """
     scene = SCENES["drift_to_rest"]
-    exact, uncertainty = reference_end(scene, 60.0)
-    assert uncertainty < 1e-9
+    assert reference_end(scene, 60.0)[1] < 1e-9
     orders = {}
     for name, steps in (("semi_implicit_euler", (0.05, 0.025, 0.0125, 0.00625)),
                         ("drag_implicit", (0.05, 0.025, 0.0125, 0.00625)),
                         ("splitting", (0.0125, 0.00625, 0.003125, 0.0015625)),
                         ("rk4", (0.0625, 0.03125, 0.015625, 0.0078125))):  # fmt: skip
-        errors = [largest(reached(scene, Setting(name, h, 0.5)).end, exact) for h in steps]
+        errors, _ = off_at_the_end(scene, integrator(integrator_number(name)), steps)
         orders[name] = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
     assert orders["semi_implicit_euler"] == pytest.approx(1.0, abs=0.1)
     assert orders["drag_implicit"] == pytest.approx(1.0, abs=0.1)
     assert orders["splitting"] == pytest.approx(1.0, abs=0.1)
     assert orders["rk4"] == pytest.approx(2.0, abs=0.2)
-    for tolerance in (1e-4, 1e-6, 1e-8):
-        assert largest(reached(scene, Setting("adaptive", 0.01, 0.5, tolerance)).end, exact) < 10.0 * tolerance
+    tolerances = (1e-4, 1e-6, 1e-8)
+    for tolerance, error in zip(tolerances, off_at_the_end(scene, ADAPTIVE, tolerances)[0], strict=True):
+        assert error < 10.0 * tolerance
 
 
 def test_sliding_alone_rk4_keeps_its_order() -> None:

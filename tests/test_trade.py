@@ -2,8 +2,8 @@
 
 import csv
 import math
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -12,25 +12,25 @@ from click.testing import CliRunner
 
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.elsewhere import compiler
+from hovercraft_fmu.fmu.interface import STATES
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.model.subcycling import advance, substeps
 from hovercraft_fmu.scenes import SCENES, Scene
-from hovercraft_fmu.simulation import held_steps, plan
-from hovercraft_fmu.studies import model_exchange, work_precision
+from hovercraft_fmu.simulation import held_steps, plan, schedule, simulate
+from hovercraft_fmu.studies import model_exchange, trade
 from hovercraft_fmu.studies.laboratory import Ready, Timed, interleaved, text
-from hovercraft_fmu.studies.reference_end import reference_end
+from hovercraft_fmu.studies.owners import ACCURACIES, TIE, of_scenes
+from hovercraft_fmu.studies.reference_end import reference_end, reference_path
 from hovercraft_fmu.studies.step_costs import OURS, PLAIN, Loops
 from hovercraft_fmu.studies.work_precision import (
-    ACCURACIES,
     HELD,
     MIDDLE,
-    Setting,
     fitted,
+    go,
     holding_costs,
     observed_orders,
-    reached,
     tolerance_errors,
 )
 from tests.conftest import FMI_2, ROOT
@@ -45,8 +45,6 @@ def records(path: Path) -> list[dict[str, str]]:
 
 def test_the_reference_is_that_of_the_closed_form() -> None:
     """The solver, on scenes whose closed form it is not told, agrees to its tolerance."""
-    from dataclasses import replace
-
     for name in ("launch", "coast", "cycloid"):
         exact, _ = reference_end(SCENES[name], 60.0)
         solved, uncertainty = reference_end(replace(SCENES[name], exact=None), 60.0)
@@ -55,9 +53,13 @@ def test_the_reference_is_that_of_the_closed_form() -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_the_reference_is_sharp_enough_for_every_accuracy_advised(name: str) -> None:
-    _, uncertainty = reference_end(SCENES[name], 60.0)
-    assert uncertainty < 0.01 * min(ACCURACIES)
+def test_the_reference_is_sharp_enough_for_every_accuracy(name: str) -> None:
+    """And on the way it is what it is at the end of a shorter run."""
+    scene = SCENES[name]
+    assert reference_end(scene, scene.stop_time)[1] < 0.2 * min(ACCURACIES)
+    middle = 0.45 * scene.stop_time
+    on_the_way = reference_path(scene, [middle, scene.stop_time])[:, 0]
+    assert on_the_way == pytest.approx(reference_end(scene, middle)[0], abs=1e-8)
 
 
 def test_observed_orders() -> None:
@@ -71,19 +73,42 @@ def test_observed_orders() -> None:
 
 
 def test_holding_costs_a_first_order_and_the_middle_a_second() -> None:
-    found = holding_costs(["slalom"])
+    found = holding_costs(["slalom"], (0.1, 0.5, 1.0))
     for given, order in ((HELD, 1.0), (MIDDLE, 2.0)):
         own = found.filter(given=given)
         assert fitted(own["communication_step"], own["position_error"]) == pytest.approx(order, abs=0.1)
 
 
-def test_a_millimetre_on_turn() -> None:
-    """The default meets it; RK4 meets it with a five-hundredth of the sub-steps."""
-    exact, _ = reference_end(SCENES["turn"], 60.0)
-    for setting, most in ((Setting("semi_implicit_euler", 0.001, 0.5), 60000), (Setting("rk4", 0.5, 0.5), 120)):
-        end, count = reached(SCENES["turn"], setting)
-        assert math.dist(end[:2], exact[:2]) <= 1e-3
-        assert count == most
+@pytest.mark.parametrize(("number", "name", "setting"), [(2, "step_size", 0.1), (3, "tolerance", 1e-4)])
+def test_the_study_runs_what_the_fmu_runs(number: int, name: str, setting: float, native_fmu: Path) -> None:
+    """Inputs that ramp, jump and bend inside a communication step; and the largest error is that of the way."""
+    method, run = INTEGRATORS[number], plan("ice", communication_step=5.0)
+    values: dict[str, str | float] = {"step_size": 0.01, "integrator": method.name, name: setting}
+    result = simulate("ice", native_fmu, start_values=values, communication_step=5.0)
+    ends = [piece.end for piece in schedule(run)]
+    truth = reference_path(SCENES["ice"], ends)
+    went = go(run, method, [setting], truth)
+    assert went.ends[:, 0].tolist() == [result[name][-1] for name in STATES]
+    assert went.substeps[0] == result["substeps"][-1]
+    seen = np.array([np.interp(ends, result["time"], result[axis]) for axis in ("pose.x", "pose.y")])
+    points = np.isin(ends, result["time"])
+    assert went.largest[0] >= np.hypot(*(seen - truth[:2]))[points].max()
+
+
+def test_a_run_that_leaves_the_numbers_is_marked() -> None:
+    wild = replace(SCENES["coast"], start=State(vx=1e4))
+    went = go(plan(wild), INTEGRATORS[0], [1e-4, 0.1])
+    assert np.isnan(went.ends).all(axis=0).tolist() == [False, True]
+
+
+def test_the_owner_is_the_cheapest_and_ties_are_marked() -> None:
+    rows = [("a", 0.1, 8.0, 1e-3, "nothing"), ("a", 0.5, 2.0, 0.5, "nothing"), ("b", 0.5, 7.0, 1e-3, "nothing"),
+            ("c", 0.5, 1.0, 1e-6, "warned"), ("d", 0.5, 100.0, 1e-6, "nothing")]  # fmt: skip
+    names = "method", "setting", "loads", "largest_error", "said"
+    table = [{"scene": "s", "communication_step": 5.0, **dict(zip(names, row, strict=True))} for row in rows]
+    owners = {owner.within: owner.owner for owner in of_scenes(pl.DataFrame(table))}
+    assert TIE == 1.25
+    assert owners == {"1 m": "a", "10 mm": "b = a", "1 mm": "b = a", "1e-05 m": "d"}
 
 
 def test_the_error_of_adaptive_follows_its_tolerance_on_every_held_scene() -> None:
@@ -158,37 +183,30 @@ def quick(name: str, folder: Path) -> str:
 @pytest.mark.once
 @FMI_2
 def test_the_quick_trade(tmp_path: Path, complete_native_fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is committed was written by the same command, and tells the same of the errors. Here with the one
-    communication step that advice is given at: with each of the others it does as much again.
-    """
-    monkeypatch.setattr(work_precision, "COMMUNICATION_STEPS", (0.5,))
+    """What is committed was written by the same command: of methods with a fixed step every count and error again."""
+    monkeypatch.setattr(trade, "TIMED", {"rk4": (0.5,)})
+    monkeypatch.setattr(model_exchange, "TOLERANCES", model_exchange.TOLERANCES[1::3])
     assert complete_native_fmu.exists()  # so there is machine code
     printed = quick("trade", tmp_path)
-    rows, advice = records(tmp_path / "work_precision.csv"), records(tmp_path / "advice.csv")
-    assert {row["integrator"] for row in rows} == {method.name for method in INTEGRATORS}
-    assert [float(row["accuracy_m"]) for row in advice] == list(ACCURACIES)
-    assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in advice)
-    assert all(float(row["position_error"]) <= float(row["accuracy_m"]) for row in records(RESULTS / "advice.csv"))
-    same = ("scene", "integrator", "step_size", "tolerance", "communication_step")
-    committed = {
-        tuple(row[name] for name in same): row for row in map(numbers, records(RESULTS / "work_precision.csv"))
-    }
-    for row in map(numbers, rows):
-        known = committed[tuple(row[name] for name in same)]
-        assert row["position_error"] == pytest.approx(known["position_error"], rel=1e-3, abs=1e-10)
+    runs, committed = (pl.read_csv(each / "work_precision.csv") for each in (tmp_path, RESULTS))
+    assert set(runs["method"]) == {method.name for method in INTEGRATORS}
+    assert set(committed["scene"]) == set(SCENES)
+    key = ["scene", "method", "setting", "communication_step"]
+    both = runs.filter(pl.col("method") != "adaptive").join(committed, on=key, suffix="_known")
+    assert len(both) > 60
+    for name in ("loads", "end_error", "largest_error"):
+        assert both[name].to_list() == pytest.approx(both[f"{name}_known"].to_list(), rel=1e-3, abs=1e-9, nan_ok=True)
+    owners = records(tmp_path / "owners.csv")
+    assert {row["region"] for row in owners} > {"turn", "random, driven"}
+    assert all(row["owner"] for row in owners)
+    assert {row["region"] for row in records(RESULTS / "owners.csv")} > set(SCENES)
     assert (tmp_path / "work_precision.png").stat().st_size > 10000
-    chosen, runs = records(tmp_path / "exchange.csv"), records(tmp_path / "exchange_runs.csv")
-    assert [float(row["accuracy_m"]) for row in chosen] == list(model_exchange.ACCURACIES)
-    others = records(RESULTS / "exchange_runs.csv")
-    assert {row["scene"] for row in others} == {scene.name for scene in model_exchange.SMOOTH}
-    for ours, theirs in zip(runs, [row for row in others if row["scene"] == "turn"], strict=True):
-        assert ours["solver"] == theirs["solver"]
-        assert float(ours["error"]) <= 2.0 * float(theirs["error"]) + 1e-10
-    assert "| accuracy [m]" in printed
-
-
-def numbers(row: dict[str, str]) -> dict[str, Any]:
-    return {name: value if name in ("scene", "integrator") else float(value) for name, value in row.items()}
+    others = {float(row["tolerance"]): row for row in records(RESULTS / "exchange_runs.csv") if row["scene"] == "turn"}
+    for row in records(tmp_path / "exchange_runs.csv"):
+        assert float(row["error"]) <= 2.0 * float(others[float(row["tolerance"])]["error"]) + 1e-10
+    (time,) = records(tmp_path / "times.csv")
+    assert float(time["fmpy"]) < float(time["Python FMU"])
+    assert "| region" in printed
 
 
 @pytest.mark.once
@@ -202,6 +220,8 @@ def test_the_quick_costs_of_a_step(tmp_path: Path, complete_native_fmu: Path) ->
     if compiler():
         assert [row["what"] for row in costs if row["compared_with"] == PLAIN] == ["semi_implicit_euler: a sub-step"]
         assert len([row for row in costs if row["what"].startswith("C host: ")]) == 4
+        parts = {row["what"]: 1.0 / float(row["ratio"]) for row in costs}
+        assert 0.0 < parts["a square root"] < parts["a sine with its cosine"] < 1.0
     for row in costs:
         assert float(row["ratio"]) == pytest.approx(float(row["other"]) / float(row["native"]))
     # a Python call of a step of a second costs less than the thousand sub-steps of it in Python
@@ -224,7 +244,7 @@ def test_the_readme_shows_what_is_committed() -> None:
 def test_ramps_are_the_controls_of_the_scene(scene: Scene) -> None:
     """At any time, and without a gap; outputs are read at least every half second."""
     names = (scene.signals.dtype.names or ())[1:]
-    times = np.linspace(0.01, 59.99, 997)
+    times = np.linspace(0.01, scene.stop_time - 0.01, 997)
     parts = list(model_exchange.ramps(scene))
     assert [part.begin for part in parts] == [0.0, *(part.end for part in parts[:-1])]
     for time in times:
@@ -233,4 +253,4 @@ def test_ramps_are_the_controls_of_the_scene(scene: Scene) -> None:
         assert part.at(time)[: len(expected)] == pytest.approx(expected, abs=1e-12)
     points = [point for part in parts for point in part.points()]
     assert 0.0 < min(np.diff([0.0, *points])) <= max(np.diff([0.0, *points])) <= 0.5
-    assert points[-1] == 60.0
+    assert points[-1] == scene.stop_time

@@ -21,9 +21,9 @@ class Measurement(NamedTuple):
 
 
 MEASUREMENTS: Mapping[str, Measurement] = {
-    "trade": Measurement("trade", "methods, steps, communication steps over the scenes; a host's solver", "10 minutes"),
+    "trade": Measurement("trade", "methods, steps, communication steps over the scenes; a host's solver", "3 minutes"),
     "stability": Measurement("stability", "where each method breaks: limits of the step; random extremes", "2 minutes"),
-    "scene-terms": Measurement("scene_terms", "what each opt-in term costs, and what leaving it out does", "3 minutes"),
+    "scene-terms": Measurement("scene_terms", "what each opt-in term costs, and what leaving it out does", "1 minute"),
     "coupling": Measurement("closed_loop", "what the communication step of the closed loop costs", "3 minutes"),
     "error-estimate": Measurement(
         "estimates", "what the FMU says of its error, beside it; what is advised for every scene", "2 minutes"

@@ -98,15 +98,20 @@ ROUNDING = 1e-11
 # ---- what is drawn
 
 
-def own_steps(rng: np.random.Generator, runs: Batch) -> Array:
-    """s: 1e-5 to 3 times the time in which the craft's motion changes, at most 10 s."""
+def own_time(runs: Batch) -> Array:
+    """s: the time in which the craft's motion changes."""
     push, turn = pushes(runs)
     craft, k = runs.craft, runs.craft.drag_factor
     force = push + turn / craft.length
     # drag at the speed of the start and at the terminal speed, rotation now and by the thrusters
     drag = craft.drag_rate * (observe_fleet(runs.start, runs.controls, craft)[5] + np.sqrt(k * force))
     rotation = np.abs(runs.start.yaw_rate) + np.sqrt(turn / craft.inertia)
-    return np.minimum(_logarithmic(rng, 1e-5, 3.0, len(runs.h)) / (drag + rotation + 1e-6), 10.0)
+    return 1.0 / (drag + rotation + 1e-6)
+
+
+def own_steps(rng: np.random.Generator, runs: Batch) -> Array:
+    """s: 1e-5 to 3 times the craft's own time, at most 10 s."""
+    return np.minimum(_logarithmic(rng, 1e-5, 3.0, len(runs.h)) * own_time(runs), 10.0)
 
 
 WITH_TERMS = "the same, with every term"

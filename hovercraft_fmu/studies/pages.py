@@ -6,6 +6,7 @@ table, a picture or a template has changed; a test holds what is committed equal
 
 import csv
 import io
+import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -18,6 +19,7 @@ from PIL import Image, PngImagePlugin
 
 from ..autopilot import pilot_package
 from ..coupling import sail
+from ..drawing.palette import METHODS
 from ..fmu.archive import digest
 from ..fmu.document import FOLDER as PACKED
 from ..fmu.document import rendered
@@ -34,10 +36,10 @@ from ..sweeps.study import SHIPPED
 from ..tether import tether_package
 from ..towing import BEND, haul
 from ..view.diagram import draw_diagram
-from ..view.plots import plot_passage, plot_run
+from ..view.plots import plot_passage
 from ..view.tow_pictures import plot_tow
 from ..whole import temporary_folder, write_whole
-from . import closed_loop, scene_terms, work_precision
+from . import closed_loop, owners, scene_terms, work_precision
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,20 +49,21 @@ RESULTS = HERE / "results"
 """What `hovercraft-fmu measure` wrote, with `--output` there; the pictures it leaves there are not committed."""
 PICTURES: Mapping[str, tuple[Path, ...]] = {
     "diagram.png": (),
-    "ice.png": (CONTROL_LOGS / "ice.csv",),
+    "ice.svg": (CONTROL_LOGS / "ice.csv",),
     "turning_circle.png": (SHIPPED / "turning_circle.toml", SHIPPED / "turning_circle.csv"),
     "stability.png": (RESULTS / "stability.csv", RESULTS / "extremes.csv"),
-    "work_precision.svg": (RESULTS / "work_precision.csv",),
+    "work_precision.svg": (RESULTS / "work_precision.csv", RESULTS / "holding.csv"),
     "coupling.svg": (RESULTS / "coupling.csv",),
     "scene_terms.svg": (RESULTS / "scene_terms.csv",),
 }
 """Each picture of the pages, and what it shows."""
-DRAWN: Mapping[str, Callable[[pl.DataFrame], "Figure"]] = {
+DRAWN: Mapping[str, Callable[..., "Figure"]] = {
     "coupling.svg": closed_loop.draw,
+    "ice.svg": lambda _log: run_model(plan("ice", communication_step=1.0)).plot(),
     "scene_terms.svg": scene_terms.draw,
     "work_precision.svg": work_precision.draw_work_precision,
 }
-"""Those that are drawn of their table alone."""
+"""Those that are drawn of their tables alone, as lines."""
 COLORS = 24
 """Of a picture's palette: lines and markers need few."""
 COLORS_OF_LOOP = 32
@@ -76,9 +79,23 @@ def pages() -> dict[str, bytes]:
         "measured": _measured(),
         "machine": (RESULTS / "machine.txt").read_text(encoding="utf-8").strip(),
         "study": (SHIPPED / "turning_circle.toml").read_text(encoding="utf-8"),
+        "tie": owners.TIE,
+        "colors": {name: style.color for name, style in METHODS.items()},
+        **_owned(),
         "observed": (*STATES, *MOTION, *ACTION, *WATCHED, *ERRORS),
     }
     return {name: page.encode() for name, page in rendered(HERE, values).items()}
+
+
+def _owned() -> dict[str, object]:
+    """The map, region by region: of scenes, of random craft; and who owns nothing."""
+    found = pl.read_csv(RESULTS / "owners.csv")
+    regions = [(rows["region"][0], rows.to_dicts()) for rows in found.partition_by("region", maintain_order=True)]
+    scene_owners = [each for each in regions if each[0] in SCENES]
+    random_owners = [(name.removeprefix("random, "), rows) for name, rows in regions if name not in SCENES]
+    return {
+        "scene_owners": scene_owners, "random_owners": random_owners, "superseded": owners.superseded(found),
+    }  # fmt: skip
 
 
 def shown(name: str) -> str:
@@ -96,12 +113,16 @@ def in_palette(picture: Path, shows: str, colors: int = COLORS) -> bytes:
     return content.getvalue()
 
 
+LONG_NUMBER = re.compile(r"(?<=[ \"LM,(])(-?\d+\.\d)\d+(?=[ \"\n,)L])")
+"""In an SVG: what is behind the tenth of a point is not seen."""
+
+
 def line_art(figure: "Figure", shows: str) -> bytes:
     """An SVG, which says what it shows; the same bytes each time."""
     content = io.BytesIO()
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hovercraft"}):
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hovercraft", "path.simplify_threshold": 0.5}):
         figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None, "Source": shows})
-    return content.getvalue()
+    return LONG_NUMBER.sub(r"\1", content.getvalue().decode()).encode()
 
 
 def assemble(results: Path = RESULTS) -> list[Path]:
@@ -111,8 +132,7 @@ def assemble(results: Path = RESULTS) -> list[Path]:
     """
     files = {PACKED / name: content for name, content in pages().items()}
     for name, draw in DRAWN.items():
-        (table,) = PICTURES[name]
-        files[PACKED / name] = line_art(draw(pl.read_csv(table)), shown(name))
+        files[PACKED / name] = line_art(draw(*map(pl.read_csv, PICTURES[name])), shown(name))
     with temporary_folder() as folder:
         _draw(Path(folder))
         for name in PICTURES.keys() - DRAWN.keys():
@@ -140,8 +160,6 @@ def default_result(fmu: Path) -> bytes:
 def _draw(folder: Path) -> None:
     """What is drawn anew each time: it takes seconds."""
     draw_diagram().savefig(folder / "diagram.png", format="png")
-    ice = plan(CONTROL_LOGS / "ice.csv", preset="ice", communication_step=SCENES["ice"].communication_step)
-    plot_run(run_model(ice), folder / "ice.png")
     fmu, autopilot = build_fmu(folder / "Hovercraft.fmu"), pilot_package.build_autopilot(folder / "Autopilot.fmu")
     plot_passage(sail(VOYAGES["crosswind"], fmu, autopilot), folder / pilot_package.PICTURE)
     tether = tether_package.build_tether(folder / "Tether.fmu")
@@ -162,10 +180,14 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 
 def _short(text: str) -> str:
+    """Three digits; none of a count, nothing where there is no number."""
     try:
-        return f"{float(text):.3g}"
+        number = float(text)
     except ValueError:
         return text
+    if number != number:  # NaN
+        return ""
+    return text if text.isdecimal() else f"{number:.3g}"
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,13 +12,16 @@ import polars as pl
 
 from ..drawing.figures import new_figure
 from ..drawing.palette import INK, SHADES
+from ..fmu.interface import INPUTS
+from ..fmu.native_package import build_native_fmu
 from ..fmu.start_values import Value
+from ..host import Fmu, Instance
 from ..model.craft import DIRECTIONAL
-from ..model.dynamics import State
-from ..model.subcycling import advance, meant_step
 from ..scenes import SCENES, Scene
-from ..simulation import held_steps, plan
-from .laboratory import Findings, Ready, Shown, Tell, interleaved, spread
+from ..simulation import plan, schedule
+from ..whole import temporary_folder
+from .laboratory import Findings, Ready, Shown, Tell, interleaved, part, spread
+from .work_precision import Went, go
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,22 +79,29 @@ TERMS = (
 )  # fmt: skip
 
 
-def walk(scene: Scene, settings: Mapping[str, Value]) -> Ready[list[State]]:
-    """The whole scene on the bare model: the states at its own communication points."""
-    run = plan(scene, start_values=settings)
-    craft, settled = run.craft, run.settings
-    steps = [
-        (meant_step(time, end - time, run.start_time, settled.step_size), controls)
-        for time, end, controls in held_steps(run)
-    ]
+PRICED = 20.0
+"""s: of one communication step, so that what a call costs is out of sight."""
 
-    def go() -> list[State]:
-        states = [run.start]
-        for duration, controls in steps:
-            states.append(advance(states[-1], controls, craft, duration, settled).state)
-        return states
 
-    return lambda: go
+def walked(scene: Scene, settings: Mapping[str, Value]) -> Went:
+    """The whole scene, with its inputs as they go."""
+    run = plan(scene, start_values=settings, communication_step=1.0)
+    return go(run, run.settings.integrator, [run.settings.step_size])
+
+
+def price(instance: Instance, scene: Scene, settings: Mapping[str, Value]) -> Ready[None]:
+    """The native FMU for PRICED seconds from the start of a scene, with the inputs of its middle."""
+    run, inputs = plan(scene, start_values=settings), instance.port(*INPUTS)
+    pieces = list(schedule(run))
+    controls = pieces[len(pieces) // 2].first
+
+    def ready() -> Callable[[], None]:
+        instance.reset()
+        instance.start(run.start_values)
+        inputs.set(controls)
+        return lambda: instance.step(0.0, PRICED)
+
+    return ready
 
 
 SHOWN = ("turn", "ice", "drift_to_rest")
@@ -98,31 +109,43 @@ SHOWN = ("turn", "ice", "drift_to_rest")
 
 
 def measure(quick: bool, tell: Tell) -> Findings:
-    """Every term in every scene, with and without, at the default method; quick: three scenes, once.
+    """Every term in every scene, with and without, at the default method; quick: three scenes.
 
-    The time of the bare model with the term over that without; how far the end moves [m, rad]; the length of the path.
+    How far the end moves [m, rad], by which terms are ranked; the length of the path; and beside it the time of the
+    native FMU with the term over that without.
     """
     scenes = [SCENES[name] for name in SHOWN] if quick else list(SCENES.values())
-    walks = {}
-    for term, scene in itertools.product(TERMS, scenes):
-        walks[term.name, scene.name, False] = walk(term.off(scene), {})
-        walks[term.name, scene.name, True] = walk(term.on(scene), term.settings)
-    timed = interleaved(walks, 1 if quick else ROUNDS, tell)
+    cases = list(itertools.product(TERMS, scenes))
+    with temporary_folder() as folder, Fmu(build_native_fmu(Path(folder) / "N.fmu")) as fmu, fmu.instance() as instance:
+        prices = {}
+        for term, scene in cases:
+            prices[term.name, scene.name, False] = price(instance, term.off(scene), {})
+            prices[term.name, scene.name, True] = price(instance, term.on(scene), term.settings)
+        timed = interleaved(prices, ROUNDS, part(tell, 0.0, 0.3))
     rows = []
-    for term, scene in itertools.product(TERMS, scenes):
-        off, on = (timed[term.name, scene.name, whether] for whether in (False, True))
-        a, b = off.found[-1], on.found[-1]
+    for done, (term, scene) in enumerate(cases, 1):
+        off, on = walked(term.off(scene), {}), walked(term.on(scene), term.settings)
+        (x, y, heading), before = on.ends[:3, 0].tolist(), off.ends[:3, 0].tolist()
+        dear, cheap = (timed[term.name, scene.name, whether].least for whether in (True, False))
         rows.append({
-            "term": term.name, "scene": scene.name, "cost_ratio": on.least / off.least,
-            "position_difference": math.dist(a[:2], b[:2]), "heading_difference": abs(b.heading - a.heading),
-            "path": sum(math.dist(a[:2], b[:2]) for a, b in itertools.pairwise(off.found)),
+            "term": term.name, "scene": scene.name, "cost_ratio": dear / cheap,
+            "position_difference": math.dist((x, y), before[:2]), "heading_difference": abs(heading - before[2]),
+            "path": off.way.item(),
         })  # fmt: skip
+        tell(0.3 + 0.7 * done / len(cases))
     found = pl.DataFrame(rows)
+    moved = found.group_by("term", maintain_order=True).agg((pl.col("position_difference") / pl.col("path")).median())
+    ranked = ", ".join(moved.sort("position_difference", descending=True, maintain_order=True)["term"])
     short = [
         Shown("Each term: its price, and how far the end of a scene moves with it", _short(found), "scene_terms"),
         Shown("How far the end of each scene moves", _moved(found)),
     ]
-    return Findings({"scene_terms": found}, short, {"scene_terms": draw(found)}, [spread(timed.values())])
+    return Findings(
+        {"scene_terms": found},
+        short,
+        {"scene_terms": draw(found)},
+        [f"By how far the end moves, over the path, in the median of the scenes: {ranked}", spread(timed.values())],
+    )
 
 
 def prices(found: pl.DataFrame) -> dict[str, float]:

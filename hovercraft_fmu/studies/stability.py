@@ -255,7 +255,7 @@ NOTES = (
 )  # fmt: skip
 """What is seen where, in the first panel."""
 DRAWN = ("semi_implicit_euler", "rk4", "drag_implicit")
-DOTS = 4000
+DOTS = 1500
 """A method."""
 
 
