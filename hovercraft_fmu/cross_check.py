@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._version import __version__
+from .building import build
 from .fmu.description import NATIVE
 from .fmu.interface import INPUTS, OUTPUTS
-from .fmu.native_package import build_native_fmu
 from .scenes import scene
 from .simulation import holding, plan, run_fmu
 from .whole import check_writable, write_whole
@@ -38,7 +38,7 @@ def write_cross_check(folder: Path) -> list[Path]:
     first = places[0]
     for place in places:
         check_writable(place / f"{name}.fmu")
-    fmu = build_native_fmu(first / f"{name}.fmu")
+    fmu = build("native", first / f"{name}.fmu")
     result = run_fmu(holding(plan(chosen)), fmu)
     step = chosen.communication_step
     options = {"StartTime": 0.0, "StopTime": chosen.stop_time, "StepSize": step, "RelTol": 1e-4}
