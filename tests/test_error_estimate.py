@@ -154,17 +154,17 @@ def test_every_fmu_says_what_the_model_says(method: str, friction: float, each_f
     1e-10 of that.
     """
     craft = Craft(skirt_friction=friction)
-    settings = Settings(0.05, METHODS[method], 1e-4)
+    settings = Settings(0.025, METHODS[method], 1e-4)
     state, proposed = State(vx=0.5, yaw_rate=0.1), 0.0
     companion = Companion(state)
     with one(each_fmu) as (instance, messages):
-        begin(instance, method, step_size=0.05, tolerance=1e-4, velocity__x=0.5, velocity__yaw_rate=0.1,
+        begin(instance, method, step_size=0.025, tolerance=1e-4, velocity__x=0.5, velocity__yaw_rate=0.1,
               skirt_friction=friction)  # fmt: skip
         assert get(instance, *ERRORS) == [0.0, 0.0]
         with_estimate = steps_of(instance)
         instance.reset()
         instance.setInteger([reference("integrator")], [integrator_number(method)])
-        start(instance, step_size=0.05, tolerance=1e-4, velocity__x=0.5, velocity__yaw_rate=0.1,
+        start(instance, step_size=0.025, tolerance=1e-4, velocity__x=0.5, velocity__yaw_rate=0.1,
               skirt_friction=friction)  # fmt: skip
         without = steps_of(instance)
         assert [row[:-2] for row in with_estimate] == [row[:-2] for row in without]
