@@ -329,7 +329,7 @@ def test_inputs_outside_their_limits_saturate_and_are_told_once(instance: Any, m
     assert count(instance, "warnings") == 0
     instance.doStep(0.0, 0.1)
     assert get(instance, "applied.thrust", "applied.steering") == [10.0, -3.0]
-    assert get(instance, *INPUTS) == [1e6, -3.0, 100.0, 0.0, 0.0]
+    assert get(instance, *INPUTS) == [1e6, -3.0, 100.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     instance.doStep(0.1, 0.1)
     assert messages == ["thrust = 1000000.0: is outside its limits and is held at 10.0 (said once)"]
     assert count(instance, "warnings") == INPUT_HELD
