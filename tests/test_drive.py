@@ -208,8 +208,9 @@ def test_gates_are_passed_in_their_order() -> None:
     script = (Path(gates.__file__).parent / "page" / "course.js").read_text(encoding="utf-8")
     assert f"GATE_WIDTH = {gates.WIDTH:g};" in script
     assert f"SPACING = {gates.SPACING:g};" in script
-    places = "[" + ", ".join(f"[{x / gates.SPACING:g}, {y / gates.SPACING:g}]" for x, y in gates.GATES) + "]"
-    assert f"const GATES = {places}" in script
+    (places,) = re.findall(r"const GATES = \[(.*?)\]\.map", script, re.DOTALL)
+    pairs = re.findall(r"\[([\d.-]+), ([\d.-]+)\]", places)
+    assert [(float(x) * gates.SPACING, float(y) * gates.SPACING) for x, y in pairs] == gates.GATES
     course = gates.Course((10.0, 20.0, np.pi / 2))  # down the screen
     for step in range(13):
         course.go((10.0, 20.0 + 51.0 * step, 0.0), float(step))
