@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .autopilot.guidance import Commands, Orders, Sight, Waypoint, beginning, steer
 from .autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, DEMO_COURSE, ORDERS, STATUS
-from .building import default_fmu
+from .building import default_autopilot_kind, default_fmu
 from .fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, STATES, WIND
 from .fmu.near_names import did_you_mean, must_be_one_of
 from .host import Fmu, Instance
@@ -126,7 +126,7 @@ def sail(
         SimulationError: an FMU refused a value or a step, with its message.
     """
     chosen = _chosen(which)
-    autopilot = default_fmu("autopilot") if autopilot is None else autopilot
+    autopilot = default_fmu(default_autopilot_kind()) if autopilot is None else autopilot
     with (
         Fmu(fmu or default_fmu(), HOVERCRAFT.name) as craft_fmu,
         Fmu(autopilot, AUTOPILOT_MODEL.name) as pilot_fmu,

@@ -13,8 +13,10 @@ from filelock import FileLock
 from hypothesis import settings
 
 from hovercraft_fmu import advance_fleet, build
-from hovercraft_fmu.autopilot.pilot_package import build_autopilot
+from hovercraft_fmu.autopilot.pilot_native import AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3
+from hovercraft_fmu.autopilot.pilot_package import build_autopilot, build_native_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
+from hovercraft_fmu.fmu.interface import HOVERCRAFT
 from hovercraft_fmu.fmu.machine_code import BROWSER, TARGETS, NotCompiledError
 from hovercraft_fmu.fmu.native_package import build_native_fmu
 from hovercraft_fmu.fmu.python_package import build_fmu
@@ -75,7 +77,8 @@ def _compiled(flavour: Flavour, name: str, built: Built, platforms: Collection[s
         compile_libraries(platforms)
         if BROWSER in platforms:  # as the package builds it
             return build("native" if flavour is NATIVE else "native3", path)
-        return build_native_fmu(path, flavour, platforms)
+        make_it = build_native_fmu if flavour.model is HOVERCRAFT else build_native_autopilot
+        return make_it(path, flavour, platforms)
 
     try:
         return built(name, make)
@@ -120,8 +123,34 @@ def complete_native_fmu(standard: int, built: Built) -> Path:
 
 @pytest.fixture(scope="session")
 def autopilot(built: Built) -> Path:
-    """The autopilot's FMU of this tree."""
+    """The autopilot's Python FMU of this tree."""
     return built("Autopilot.fmu", build_autopilot)
+
+
+@pytest.fixture(scope="session")
+def native_autopilot(built: Built) -> Path:
+    """The native one, FMI 2.0, for this machine alone."""
+    return _compiled(AUTOPILOT_NATIVE, "AutopilotNative.fmu", built, HERE[sys.platform])
+
+
+@pytest.fixture(scope="session")
+def native3_autopilot(built: Built) -> Path:
+    """And of FMI 3.0."""
+    return _compiled(AUTOPILOT_NATIVE3, "AutopilotNative3.fmu", built, HERE[sys.platform])
+
+
+@pytest.fixture(scope="session")
+def each_native_autopilot(standard: int, request: pytest.FixtureRequest) -> Path:
+    """The native autopilot of FMI 2.0, then that of FMI 3.0."""
+    made: Path = request.getfixturevalue("native_autopilot" if standard == 2 else "native3_autopilot")
+    return made
+
+
+@pytest.fixture(scope="session")
+def each_autopilot(flavour: str, request: pytest.FixtureRequest) -> Path:
+    """All kinds of it, beside `each_fmu`."""
+    made: Path = request.getfixturevalue("autopilot" if flavour == "python" else f"{flavour}_autopilot")
+    return made
 
 
 FLAVOURS = ("python", "native", "native3")

@@ -11,7 +11,8 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
+from hovercraft_fmu.fmu.description import NATIVE, Flavour
+from hovercraft_fmu.libraries import NATIVE_FLAVOURS
 from tests import attacks
 from tests.native import C_INCLUDES, C_TESTS, written_sources
 
@@ -31,6 +32,12 @@ def missing() -> str:
     return "" if shutil.which("clang") and sys.platform == "linux" else "no clang: apt-get install clang"
 
 
+def folder_of(flavour: Flavour) -> str:
+    """The model's."""
+    assert flavour.native
+    return flavour.native.folder
+
+
 def compiled(folder: Path, flavour: Flavour = NATIVE, options: tuple[str, ...] = SHORT) -> Path:
     """The program, of the sources in that folder."""
     header, program = folder / "variables.h", folder / "fuzz"
@@ -38,6 +45,7 @@ def compiled(folder: Path, flavour: Flavour = NATIVE, options: tuple[str, ...] =
     assert text.count(BLOCK) == 1
     header.write_text(text.replace(BLOCK, BLOCK_TO_WRITE), encoding="utf-8")
     command = ["clang", "-std=c11", "-Wall", "-Wextra", "-ffp-contract=off", *options, f"-DFMI={flavour.fmi}",
+               f'-DFUZZED="fuzz_{folder_of(flavour)}.h"',
                f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX", "-I", str(folder), *C_INCLUDES,
                str(folder / flavour.unit), str(C_TESTS / "fuzz.c"), "-o", str(program)]  # fmt: skip
     built = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -60,7 +68,7 @@ def calls(seconds: int) -> str:
     if missing():
         sys.exit(missing())
     said = []
-    for each in (NATIVE, NATIVE3):
+    for each in NATIVE_FLAVOURS:
         with tempfile.TemporaryDirectory() as place:
             program = compiled(written_sources(Path(place), each), each, LONG)
             said.append(fuzz(program, f"-max_total_time={seconds}"))

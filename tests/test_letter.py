@@ -13,7 +13,7 @@ from fmpy.fmi1 import FMICallException
 from lxml import etree
 
 from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL
-from hovercraft_fmu.autopilot.pilot_package import AUTOPILOT
+from hovercraft_fmu.autopilot.pilot_native import AUTOPILOT, AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour, model_description, xml
 from hovercraft_fmu.fmu.extras import RESULT, terminals
 from hovercraft_fmu.fmu.interface import BY_NAME, EXTERNAL, HOVERCRAFT, INPUTS, STATES
@@ -21,7 +21,7 @@ from hovercraft_fmu.studies.pages import default_result
 from tests.exchange import get_vector, go, put_states
 from tests.lowlevel import DISCARD, ERROR, everything, one, put, start
 
-FLAVOURS = [PYTHON, NATIVE, NATIVE3, AUTOPILOT]
+FLAVOURS = [PYTHON, NATIVE, NATIVE3, AUTOPILOT, AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3]
 
 
 @pytest.fixture(params=FLAVOURS, ids=lambda flavour: flavour.identifier)
@@ -108,7 +108,7 @@ def test_what_must_be_greater_than_0_has_no_bound_of_0(description: Any) -> None
 def test_inputs_alone_are_set_inside_a_step(description: Any, kind: Flavour) -> None:
     """[3.0: 2.4.7.4, 4.4] parameters must not be; the attribute is there where the FMU asks for them."""
     inside = {node.get("name") for node in variables(description) if node.get("intermediateUpdate")}
-    assert inside == (set(INPUTS) if kind.fmi == 3 else set())
+    assert inside == (set(INPUTS) if kind is NATIVE3 else set())
 
 
 def test_the_hosts_memory_management_is_not_asked(description: Any, kind: Flavour) -> None:

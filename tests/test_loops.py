@@ -37,6 +37,7 @@ from hovercraft_fmu.coupling import (
 from hovercraft_fmu.elsewhere import HOSTS
 from hovercraft_fmu.fmu.interface import HOVERCRAFT, STATES
 from hovercraft_fmu.host import SimulationError
+from hovercraft_fmu.model.craft import PRESETS
 from hovercraft_fmu.model.integrators import integrator
 from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.scenes import VOYAGES, Voyage
@@ -273,21 +274,41 @@ def test_the_ssp_is_valid_whole_and_the_same_every_time(each_fmu: Path, autopilo
     assert hashlib.sha256(path.read_bytes()).digest() == hashlib.sha256(again.read_bytes()).digest()
     with zipfile.ZipFile(path) as archive:
         fmus = [f"resources/{each_fmu.name}", "resources/Autopilot.fmu"]
-        assert sorted(archive.namelist()) == sorted(["SystemStructure.ssd", "resources/hovercraft.ssv", *fmus])
+        sets = [f"resources/{name}.ssv" for name in ("hovercraft", "autopilot", "ice")]
+        assert sorted(archive.namelist()) == sorted(["SystemStructure.ssd", "documentation/loop.html", *sets, *fmus])
         assert archive.read(fmus[0]) == each_fmu.read_bytes()
         structure = etree.fromstring(archive.read("SystemStructure.ssd"))
-        values = etree.fromstring(archive.read("resources/hovercraft.ssv"))
+        craft, pilot, ice = (etree.fromstring(archive.read(name)) for name in sets)
     etree.XMLSchema(file=str(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(structure)
     assert_units_are_told(structure)
-    etree.XMLSchema(file=str(SCHEMAS / "SystemStructureParameterValues.xsd")).assertValid(values)
+    for values in (craft, pilot, ice):
+        etree.XMLSchema(file=str(SCHEMAS / "SystemStructureParameterValues.xsd")).assertValid(values)
+    assert_parameters_have_connectors(structure, {"hovercraft": craft, "autopilot": pilot})
+    assert given(ice) == {**given(craft), "air_density": PRESETS["ice"].air_density}
     assert structure.get("version") == "1.0"
     kinds = structure.xpath("//*[local-name() = 'Annotation']/@type")
     assert sorted(kinds) == ["com.opensimulationplatform", "org.openmodelica"]
     assert structure.xpath("//@baseStepSize | //@stepSize") == ["0.5", "0.5"]
     assert len(structure.xpath("//*[local-name() = 'Connection']")) == len(STATES) + len(COMMANDS)
-    assert values.xpath("//@value") == ["0.2"]
+    assert given(craft)["wind.y"] == 0.2
+    told = {name: given(craft)[name] for name in ("mass", "inertia", "length", "steering_force")}
+    assert told.items() <= given(pilot).items()
     with pytest.raises(ValueError, match=r"must end in \.ssp"):
         build_ssp(tmp_path / "Loop.zip", each_fmu, autopilot)
+
+
+def given(values: Any) -> dict[str, float]:
+    """What a parameter set gives, by name."""
+    return {node.get("name"): float(node[0].get("value")) for node in values.iter("{*}Parameter")}
+
+
+def assert_parameters_have_connectors(structure: Any, sets: dict[str, Any]) -> None:
+    """Each component takes its own set, which names connectors of it alone."""
+    for component in structure.iter("{*}Component"):
+        name = component.get("name")
+        assert [node.get("source") for node in component.iter("{*}ParameterBinding")] == [f"resources/{name}.ssv"]
+        connectors = {node.get("name") for node in component.iter("{*}Connector") if node.get("kind") != "output"}
+        assert given(sets[name]).keys() <= connectors
 
 
 # ---- the commands

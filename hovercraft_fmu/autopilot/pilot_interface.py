@@ -25,6 +25,8 @@ DEMO_COURSE = ((100.0, 0.0), (160.0, 60.0), (100.0, 120.0), (200.0, 180.0), (40.
 """m: the waypoints of the start values, thirty lengths of the textbook craft in all."""
 COMMANDS = ("thrust", "port_thruster", "starboard_thruster")
 """In the order of `guidance.Commands`."""
+SHOWN = (*COMMANDS, "cross_track_error", "distance", "turns")
+"""The Reals that are worked out."""
 ORDERS = tuple(field.name for field in fields(Orders))
 STATUS = {
     ARRIVED: "the course is at its end: every waypoint was reached or missed",

@@ -1,16 +1,19 @@
-"""Builds the autopilot's FMU."""
+"""Builds the autopilot's FMUs."""
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
-from ..fmu.description import PYTHON
+from ..fmu.description import FMI_3_TYPES, Flavour
 from ..fmu.document import FOLDER, rendered
+from ..fmu.machine_code import PLATFORMS
+from ..fmu.native_package import Papers, write_native_fmu
 from ..fmu.python_package import Content, write_python_fmu
 from . import guidance
 from .guidance import __doc__ as law
 from .pilot_interface import AUTOPILOT_MODEL, STATUS
+from .pilot_native import AUTOPILOT, AUTOPILOT_NATIVE
 
-AUTOPILOT = PYTHON.of(AUTOPILOT_MODEL)
 HERE = Path(__file__).parent
 PICTURE = "loop.png"
 """A voyage, as `hovercraft-fmu demo --loop` draws it."""
@@ -35,13 +38,27 @@ def build_autopilot(path: str | os.PathLike[str] = f"build/{AUTOPILOT.identifier
     return write_python_fmu(path, CONTENT)
 
 
-def _documents() -> dict[str, bytes]:
+def build_native_autopilot(
+    path: str | os.PathLike[str], flavour: Flavour = AUTOPILOT_NATIVE, platforms: Iterable[str] = tuple(PLATFORMS)
+) -> Path:
+    """Write the native autopilot of a standard to `path` and return the path. Raises as `build_native_fmu` does."""
+    papers = Papers(lambda: _documents(flavour), "Sine, cosine and arctangent are")
+    return write_native_fmu(path, flavour, papers, platforms)
+
+
+def _documents(flavour: Flavour) -> dict[str, bytes]:
     values = {
-        "model": AUTOPILOT_MODEL, "variables": AUTOPILOT_MODEL.variables, "types": {}, "law": law,
-        "status": STATUS, "advice": ADVICE,
-    }  # fmt: skip
+        "model": AUTOPILOT_MODEL,
+        "flavour": flavour,
+        "variables": AUTOPILOT_MODEL.variables,
+        "types": FMI_3_TYPES if flavour.fmi == 3 else {},
+        "law": law,
+        "status": STATUS,
+        "advice": ADVICE,
+    }
     pages = {name: page.encode() for name, page in rendered(HERE, values).items()}
-    return {REQUIREMENTS: (FOLDER / REQUIREMENTS).read_bytes(), PICTURE: (HERE / PICTURE).read_bytes(), **pages}
+    needs = {} if flavour.native else {REQUIREMENTS: (FOLDER / REQUIREMENTS).read_bytes()}
+    return {**needs, PICTURE: (HERE / PICTURE).read_bytes(), **pages}
 
 
 CONTENT = Content(
@@ -49,5 +66,5 @@ CONTENT = Content(
     "autopilot.pilot_slave",
     "AutopilotSlave",
     tuple(f"autopilot/{name}.py" for name in ("__init__", "guidance", "pilot_interface", "pilot_slave")),
-    _documents,
+    lambda: _documents(AUTOPILOT),
 )

@@ -10,8 +10,8 @@ from ..model.dynamics import State
 from .guidance import CHOICES, Commands, Orders, Pilot, Sight, Waypoint, beginning, check_order, steer
 from .pilot_interface import (
     AUTOPILOT_MODEL,
-    COMMANDS,
     ORDERS,
+    SHOWN,
     STATUS,
     WAYPOINT_NAMES,
     WAYPOINTS_MAX,
@@ -19,7 +19,6 @@ from .pilot_interface import (
 
 BY_NAME = AUTOPILOT_MODEL.by_name
 MOTION = tuple(BY_NAME[name].reference for name in STATES)
-SHOWN = (*COMMANDS, "cross_track_error", "distance", "turns")
 SHOWN_REFERENCES = tuple(BY_NAME[name].reference for name in SHOWN)
 ACTIVE, ARRIVED, STATUS_REFERENCE, MISSED, COUNT = (
     BY_NAME[name].reference for name in ("waypoint", "arrived", "status", "missed", "waypoint_count")

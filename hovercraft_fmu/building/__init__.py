@@ -11,8 +11,9 @@ from typing import Literal, NamedTuple, TypeAlias, get_args
 from xml.etree.ElementTree import ParseError, fromstring
 
 from .._version import __version__
+from ..autopilot.pilot_native import AUTOPILOT, AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3
 from ..autopilot.pilot_package import CONTENT as AUTOPILOT_CONTENT
-from ..autopilot.pilot_package import build_autopilot
+from ..autopilot.pilot_package import build_autopilot, build_native_autopilot
 from ..fmu.archive import check_target
 from ..fmu.block import guid
 from ..fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
@@ -29,8 +30,11 @@ from ..whole import temporary_folder
 from .ssp import build_ssp
 
 Kind: TypeAlias = Literal[
-    "native", "native3", "python", "autopilot", "tether", "native_loop", "native3_loop", "python_loop"
-]
+    "native", "native3", "python",
+    "native_autopilot", "native3_autopilot", "autopilot",
+    "tether",
+    "native_loop", "native3_loop", "python_loop",
+]  # fmt: skip
 FOLDER = Path("build")
 
 
@@ -47,6 +51,8 @@ class Product(NamedTuple):
 
 FLAVOURS: Mapping[str, Flavour] = MappingProxyType({"native": NATIVE, "native3": NATIVE3, "python": PYTHON})
 """The FMUs of the hovercraft, by kind."""
+AUTOPILOTS: Mapping[int, Flavour] = MappingProxyType({2: AUTOPILOT_NATIVE, 3: AUTOPILOT_NATIVE3})
+"""Machine code, by standard."""
 LOOPS: Mapping[str, str] = MappingProxyType({f"{kind}_loop": kind for kind in FLAVOURS})
 """A closed loop -> the kind of the FMU in it."""
 
@@ -57,13 +63,21 @@ def _craft(flavour: Flavour) -> Callable[[Path], Path]:
     return lambda path: build_native_fmu(path, flavour, more={PAGE: page(flavour)})
 
 
+def _pilot(flavour: Flavour) -> Callable[[Path], Path]:
+    """The autopilot of the same standard and kind as that FMU of the hovercraft."""
+    if not flavour.native:
+        return build_autopilot
+    return lambda path: build_native_autopilot(path, AUTOPILOTS[flavour.fmi])
+
+
 def _loop(flavour: Flavour) -> Product:
-    fmu, pilot = f"{flavour.identifier}.fmu", f"{AUTOPILOT_CONTENT.flavour.identifier}.fmu"
+    own = AUTOPILOTS[flavour.fmi] if flavour.native else AUTOPILOT
+    fmu, pilot = f"{flavour.identifier}.fmu", f"{own.identifier}.fmu"
 
     def write(path: Path) -> Path:
         check_target(path, ".ssp")
         with temporary_folder() as folder:
-            return build_ssp(path, _craft(flavour)(Path(folder) / fmu), build_autopilot(Path(folder) / pilot))
+            return build_ssp(path, _craft(flavour)(Path(folder) / fmu), _pilot(flavour)(Path(folder) / pilot))
 
     purpose = f"SSP 1.0: the closed loop of {fmu} and {pilot}, for co-simulation masters"
     return Product(f"{flavour.identifier}Loop.ssp", purpose, write)
@@ -89,9 +103,21 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
             _craft(PYTHON),
             lambda: python_identity(hovercraft_content(PYTHON)),
         ),
+        "native_autopilot": Product(
+            "AutopilotNative.fmu",
+            "FMI 2.0, machine code: takes the craft from waypoint to waypoint",
+            _pilot(NATIVE),
+            lambda: identity(AUTOPILOT_NATIVE),
+        ),
+        "native3_autopilot": Product(
+            "AutopilotNative3.fmu",
+            "FMI 3.0, machine code: the same for FMI 3.0",
+            _pilot(NATIVE3),
+            lambda: identity(AUTOPILOT_NATIVE3),
+        ),
         "autopilot": Product(
             "Autopilot.fmu",
-            "FMI 2.0, Python: takes the craft from waypoint to waypoint",
+            "FMI 2.0, Python: the same, to read or change the law",
             build_autopilot,
             lambda: python_identity(AUTOPILOT_CONTENT),
         ),
@@ -166,6 +192,11 @@ def default_kind() -> Kind:
     the folder of FMI 2.0 there, too.
     """
     return "native3" if sys.platform == "linux" and platform.machine() == "aarch64" else "native"
+
+
+def default_autopilot_kind() -> Kind:
+    """The same of the autopilot."""
+    return "native3_autopilot" if default_kind() == "native3" else "native_autopilot"
 
 
 def default_fmu(kind: Kind | None = None) -> Path:

@@ -6,11 +6,13 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 from .._version import RELEASE_DATE, __version__
-from ..autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS
+from ..autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, ORDERS
 from ..fmu.archive import write_archive, zipped
 from ..fmu.description import AUTHOR, xml
-from ..fmu.interface import HOVERCRAFT, STATES
+from ..fmu.document import rendered
+from ..fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, STATES
 from ..fmu.variable import Variable
+from ..model.craft import preset
 from ..scenes import VOYAGES, Voyage
 
 CRAFT, PILOT = "hovercraft", "autopilot"
@@ -23,7 +25,11 @@ for _prefix, _uri in (("ssc", SSC), ("ssd", SSD), ("ssv", SSV), ("osp", OSP), ("
     register_namespace(_prefix, _uri)
 SHOWN = tuple(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output" and v.name not in COMMANDS)
 """Outputs of the autopilot that nothing in the loop takes."""
-PARAMETERS = f"resources/{CRAFT}.ssv"
+WIND = ("wind.x", "wind.y")
+"""Inputs of the craft that nothing in the loop gives."""
+PARAMETERS, ORDERS_FILE, ICE_FILE = (f"resources/{name}.ssv" for name in (CRAFT, PILOT, "ice"))
+HERE = Path(__file__).parent
+PAGE = "loop.html"
 
 
 def build_ssp(
@@ -35,13 +41,40 @@ def build_ssp(
         ValueError: the name does not end in .ssp.
         OSError: a file cannot be read or written.
     """
+    sets = parameter_sets(voyage)
     files = {
         "SystemStructure.ssd": xml(system_structure(voyage, craft.name, autopilot.name)),
-        PARAMETERS: xml(parameter_set(voyage.craft)),
+        **{file: xml(parameter_set(Path(file).stem, values)) for file, _, values in sets},
+        f"documentation/{PAGE}": _page(voyage, craft.name, autopilot.name).encode(),
         f"resources/{craft.name}": craft.read_bytes(),
         f"resources/{autopilot.name}": autopilot.read_bytes(),
     }
     return write_archive(path, lambda: zipped(files), ".ssp")
+
+
+def parameter_sets(voyage: Voyage) -> tuple[tuple[str, str, Mapping[str, float]], ...]:
+    """File, whose it is, start values by name: the first two are bound. The autopilot is told the craft."""
+    craft = {**dict.fromkeys(WIND, 0.0), **preset_values("textbook"), **voyage.craft}
+    orders = {name: AUTOPILOT_MODEL.by_name[name].start for name in ("acceptance_radius", "cruise_speed")}
+    told = {name: craft[name] for name in ORDERS if name in CRAFT_PARAMETERS and name in craft}
+    pilot = {**{name: float(start or 0.0) for name, start in orders.items()}, **told, **voyage.autopilot}
+    ice = {**craft, **preset_values("ice")}
+    return (PARAMETERS, CRAFT, craft), (ORDERS_FILE, PILOT, pilot), (ICE_FILE, CRAFT, ice)
+
+
+def preset_values(name: str) -> dict[str, float]:
+    """What of a craft the sets give: what the autopilot is told, and the air."""
+    craft = preset(name)
+    return {each: getattr(craft, each) for each in ("mass", "inertia", "length", "steering_force", "air_density")}
+
+
+def _page(voyage: Voyage, craft: str, autopilot: str) -> str:
+    names = [Path(each).stem for each in (craft, autopilot)]
+    values = {
+        "name": f"{names[0]}Loop.ssp", "craft": craft, "autopilot": autopilot, "voyage": voyage,
+        "sets": parameter_sets(voyage), "native": names[1] != AUTOPILOT_MODEL.name,
+    }  # fmt: skip
+    return rendered(HERE, values)[PAGE]
 
 
 def system_structure(voyage: Voyage, craft: str, autopilot: str) -> Element:
@@ -60,8 +93,12 @@ def system_structure(voyage: Voyage, craft: str, autopilot: str) -> Element:
     )
     system = SubElement(root, f"{{{SSD}}}System", {"name": "loop"})
     elements = SubElement(system, f"{{{SSD}}}Elements")
-    _component(elements, CRAFT, craft, HOVERCRAFT.by_name, COMMANDS, STATES, PARAMETERS)
-    _component(elements, PILOT, autopilot, AUTOPILOT_MODEL.by_name, STATES, (*COMMANDS, *SHOWN))
+    (_, _, given), (_, _, told), _ = parameter_sets(voyage)
+    parameters = tuple(name for name in given if name not in WIND)
+    ends_of_craft = {"input": (*COMMANDS, *WIND), "output": STATES, "parameter": parameters}
+    ends_of_pilot = {"input": STATES, "output": (*COMMANDS, *SHOWN), "parameter": tuple(told)}
+    _component(elements, CRAFT, craft, HOVERCRAFT.by_name, ends_of_craft, PARAMETERS)
+    _component(elements, PILOT, autopilot, AUTOPILOT_MODEL.by_name, ends_of_pilot, ORDERS_FILE)
     connections = SubElement(system, f"{{{SSD}}}Connections")
     for start, end, names in ((CRAFT, PILOT, STATES), (PILOT, CRAFT, COMMANDS)):
         for name in names:
@@ -79,9 +116,9 @@ def system_structure(voyage: Voyage, craft: str, autopilot: str) -> Element:
     return root
 
 
-def parameter_set(values: Mapping[str, float]) -> Element:
-    """The SSV file: start values of the hovercraft, by name."""
-    root = Element(f"{{{SSV}}}ParameterSet", {"version": "1.0", "name": CRAFT})
+def parameter_set(set_name: str, values: Mapping[str, float]) -> Element:
+    """An SSV file: start values by name, all of them Reals, which every reader takes."""
+    root = Element(f"{{{SSV}}}ParameterSet", {"version": "1.0", "name": set_name})
     parameters = SubElement(root, f"{{{SSV}}}Parameters")
     for name, value in values.items():
         parameter = SubElement(parameters, f"{{{SSV}}}Parameter", {"name": name})
@@ -94,24 +131,23 @@ def _component(
     name: str,
     source: str,
     variables: Mapping[str, Variable],
-    inputs: tuple[str, ...],
-    outputs: tuple[str, ...],
-    parameters: str | None = None,
+    ends: Mapping[str, tuple[str, ...]],
+    parameters: str,
 ) -> None:
+    """`ends`: kind of connector -> variables."""
     node = SubElement(
         parent,
         f"{{{SSD}}}Component",
         {"name": name, "type": "application/x-fmu-sharedlibrary", "source": f"resources/{source}"},
     )
     connectors = SubElement(node, f"{{{SSD}}}Connectors")
-    for kind, names in (("input", inputs), ("output", outputs)):
+    for kind, names in ends.items():
         for each in names:
             connector = SubElement(connectors, f"{{{SSD}}}Connector", {"name": each, "kind": kind})
             unit = variables[each].unit
             SubElement(connector, f"{{{SSC}}}{variables[each].kind}", {"unit": unit} if unit else {})
-    if parameters:
-        bindings = SubElement(node, f"{{{SSD}}}ParameterBindings")
-        SubElement(bindings, f"{{{SSD}}}ParameterBinding", {"source": parameters})
+    bindings = SubElement(node, f"{{{SSD}}}ParameterBindings")
+    SubElement(bindings, f"{{{SSD}}}ParameterBinding", {"source": parameters})
 
 
 def _annotation(parent: Element, kind: str) -> Element:

@@ -22,7 +22,7 @@ DEMO_FOLDER = FOLDER / "demo"
 @click.option("--tow", is_flag=True, help="A tow: one craft pulls another one round a bend, by a line that is an FMU.")
 def demo(loop: bool, tow: bool) -> None:
     """Build the FMUs, check them, and drive them over a recorded control log; see build/demo/."""
-    from ..building import default_kind
+    from ..building import default_autopilot_kind, default_kind
     from ..drawing.figures import check_plot
     from ..scenes import CONTROL_LOGS, SCENES
     from ..simulation import holding, plan
@@ -33,7 +33,7 @@ def demo(loop: bool, tow: bool) -> None:
     make_room(picture, picture.with_suffix(".csv"), *([picture.with_suffix(".gif")] if tow else []))
     native = _built_and_valid(default_kind())
     if loop:
-        return _demo_of_the_loop(native, _built_and_valid("autopilot"), picture)
+        return _demo_of_the_loop(native, _built_and_valid(default_autopilot_kind()), picture)
     if tow:
         return _demo_of_the_tow(native, _built_and_valid("tether"), picture)
     python = _built_and_valid("python")

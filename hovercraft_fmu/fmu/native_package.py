@@ -1,8 +1,9 @@
 """Packs the native FMUs: machine code that was compiled before (machine_code.py), its sources, description, pages."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from .archive import write_archive, zipped
 from .block import patched
@@ -35,14 +36,35 @@ def build_native_fmu(
         ValueError: the name does not end in .fmu.
         OSError: the file cannot be written; one that stood there before still does.
     """
-    return write_archive(path or f"build/{flavour.identifier}.fmu", lambda: _archive(flavour, platforms, more))
+    papers = Papers(
+        lambda: documents(flavour, more), "Sine, cosine and logarithm are", lambda: reference_result(flavour)
+    )
+    return write_native_fmu(path or f"build/{flavour.identifier}.fmu", flavour, papers, platforms)
 
 
-def _archive(flavour: Flavour, platforms: Iterable[str], more: Mapping[str, bytes]) -> bytes:
-    notices = licenses("Sine, cosine and logarithm are fdlibm's", "fdlibm.txt", _sun_notice())
+class Papers(NamedTuple):
+    """What a native FMU has beside machine code, sources and what follows from its table."""
+
+    documents: Callable[[], Mapping[str, bytes]]
+    """Files of documentation/ but licences, by path."""
+    of_fdlibm: str
+    """'Sine and cosine are': what of its code is fdlibm's."""
+    extra: Callable[[], Mapping[str, bytes]] = dict
+    """Files of extra/, by path in the FMU."""
+
+
+def write_native_fmu(
+    path: str | os.PathLike[str], flavour: Flavour, papers: Papers, platforms: Iterable[str] = tuple(PLATFORMS)
+) -> Path:
+    """Write the native FMU of any model to `path` and return the path. Raises as `build_native_fmu` does."""
+    return write_archive(path, lambda: _archive(flavour, papers, platforms))
+
+
+def _archive(flavour: Flavour, papers: Papers, platforms: Iterable[str]) -> bytes:
+    notices = licenses(f"{papers.of_fdlibm} fdlibm's", "fdlibm.txt", _sun_notice())
     files = {
-        **{f"documentation/{name}": each for name, each in {**documents(flavour, more), **notices}.items()},
-        **reference_result(flavour),
+        **{f"documentation/{name}": each for name, each in {**papers.documents(), **notices}.items()},
+        **papers.extra(),
         "sources/buildDescription.xml": xml(build_description(flavour, OPTIONS)),
     }
     if flavour.fmi == 2:

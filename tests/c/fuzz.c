@@ -1,5 +1,5 @@
 /* Any bytes as a sequence of FMI calls with any arguments, on a few instances: libFuzzer calls LLVMFuzzerTestOneInput.
-   What differs in the standards is in fuzz_fmi2.h and, with -DFMI=3, in fuzz_fmi3.h.
+   What differs in the standards is in fuzz_fmi2.h and, with -DFMI=3, in fuzz_fmi3.h; in models, in fuzz_MODEL.h.
 
    Beside what the sanitizers see it demands that only the statuses of the standard that this FMU has come back, that a
    refused call changes nothing, and that what is read is finite. */
@@ -14,8 +14,7 @@
 #include "checksum.h"
 #include "variables.h"
 
-enum { INSTANCES = 2, SLOTS = 4, MOST = 5, BLOB = 1024, CALLS = 28 };
-static const double FEW_SUBSTEPS = 2000.0, TOO_MANY = 2e9; /* between them a step would only take long */
+enum { INSTANCES = 2, SLOTS = 4, MOST = 5, BLOB = 4096, CALLS = 28 };
 
 struct bytes {
     const uint8_t *at;
@@ -109,16 +108,9 @@ static double real_of(void *craft, unsigned reference)
     return call_get(craft, &reference, 1, &value) == CALL_OK ? value : NAN;
 }
 
-/* Of partial derivatives: mostly all of initialization mode, or all of the later ones. */
-static void some_references(struct bytes *bytes, unsigned unknowns[MOST], unsigned knowns[MOST])
-{
-    const unsigned initial = a_byte(bytes) & 1, count = initial ? INITIAL_KNOWN_COUNT : KNOWN_COUNT;
-    for (size_t i = 0; i < MOST; i++) {
-        const unsigned row = a_byte(bytes), column = a_byte(bytes);
-        unknowns[i] = row >= 224 ? a_reference(bytes) : initial ? ROWS[row % ROW_COUNT] : V_POSE_X + row % 16;
-        knowns[i] = column >= 224 ? a_reference(bytes) : KNOWNS[column % count];
-    }
-}
+static inline int integer_of(void *craft, unsigned reference);
+
+#include FUZZED /* what is the model's: fuzz_MODEL.h */
 
 #if FMI == 3
 #include "fuzz_fmi3.h"
@@ -168,14 +160,7 @@ static int step(void *craft, struct bytes *bytes)
     stepping.craft = craft;
     stepping.bytes = bytes;
     const double point = a_byte(bytes) < 240 ? time_of(craft) : a_double(bytes);
-    if (integer_of(craft, V_INTEGRATOR) == ADAPTIVE || integer_of(craft, V_INTEGRATOR_NUMBER) == ADAPTIVE) {
-        const double turn = real_of(craft, V_VELOCITY_YAW_RATE);
-        if (size > 1e-4)
-            size = 1e-4 / (1.0 + (isfinite(turn) ? fabs(turn) : 0.0));
-        return call_step(craft, point, size);
-    }
-    const double n = size / real_of(craft, V_STEP_SIZE);
-    return n <= FEW_SUBSTEPS || n >= TOO_MANY ? call_step(craft, point, size) : CALL_OK;
+    return limited_step(craft, point, size);
 }
 
 static int reals(void *craft, struct bytes *bytes, const struct world *world)
@@ -343,7 +328,7 @@ static size_t whole(void *craft, char into[BLOB])
 {
     void *state = NULL;
     size_t size = 0;
-    real_of(craft, V_SPEED);
+    real_of(craft, WORKED_OUT);
     demand(call_save(craft, &state) == CALL_OK && call_size(craft, state, &size) == CALL_OK &&
                size <= BLOB && call_serialize(craft, state, into, size) == CALL_OK,
            "a state must always be there");

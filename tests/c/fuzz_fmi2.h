@@ -20,7 +20,7 @@ static void *made(struct bytes *bytes)
                            how & 2 ? &callbacks : NULL, fmi2False, how & 4 ? fmi2True : fmi2False);
 }
 
-static int integer_of(void *craft, unsigned reference)
+static inline int integer_of(void *craft, unsigned reference)
 {
     int value = 0;
     fmi2GetInteger(craft, &reference, 1, &value);
@@ -56,7 +56,7 @@ static int integers(void *craft, struct bytes *bytes)
     unsigned references[MOST];
     int values[MOST] = {0};
     for (size_t i = 0; i < n; i++) {
-        references[i] = a_byte(bytes) & 1 ? V_INTEGRATOR : a_reference(bytes);
+        references[i] = a_byte(bytes) & 1 ? A_NUMBER : a_reference(bytes);
         values[i] = an_integer(bytes);
     }
     return how & 128 ? fmi2SetInteger(craft, references, n, how == 255 ? NULL : values)

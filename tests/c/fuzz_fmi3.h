@@ -22,7 +22,7 @@ static void update(fmi3InstanceEnvironment environment, double time, bool set, b
 
 static void *made(struct bytes *bytes)
 {
-    static const unsigned reference = V_THRUST;
+    static const unsigned reference = 0; /* an input */
     const unsigned how = a_byte(bytes);
     const fmi3LogMessageCallback log = how & 2 ? call_log : NULL;
     const bool logging = how & 4;
@@ -42,7 +42,7 @@ static void *made(struct bytes *bytes)
                                        NULL, log, how & 16 ? update : NULL);
 }
 
-static int integer_of(void *craft, unsigned reference)
+static inline int integer_of(void *craft, unsigned reference)
 {
     int64_t item = 0;
     int32_t number = 0;
@@ -83,7 +83,7 @@ static int integers(void *craft, struct bytes *bytes)
     int64_t values[MOST] = {0};
     int32_t small[MOST] = {0};
     for (size_t i = 0; i < n; i++) {
-        references[i] = a_byte(bytes) & 1 ? V_INTEGRATOR : a_reference(bytes);
+        references[i] = a_byte(bytes) & 1 ? A_NUMBER : a_reference(bytes);
         values[i] = an_integer(bytes);
         if (how & 16)
             take(bytes, &values[i], sizeof values[i]);

@@ -69,11 +69,11 @@ enum verdict instance_set_states(struct instance *instance, const double *values
     struct content *now = &instance->now;
     if (check_number(instance, SET_STATES, n) == REFUSED)
         return REFUSED;
-    for (unsigned i = 0; i < STATE_COUNT; i++)
+    for (size_t i = 0; i < n; i++)
         if (!isfinite(values[i]))
             return instance_say(instance, DISCARDED, "%s = %r: must be a finite number", VARIABLES[STATES[i]].name,
                                 values[i]);
-    for (unsigned i = 0; i < STATE_COUNT; i++)
+    for (size_t i = 0; i < n; i++)
         states_of(now)[i] = values[i];
     now->unread = now->unread_on_demand = true;
     return FINE;
@@ -97,7 +97,7 @@ enum verdict instance_get_nominals(struct instance *instance, double *values, si
 {
     if (check_number(instance, GET_NOMINALS, n) == REFUSED)
         return REFUSED;
-    for (unsigned i = 0; i < STATE_COUNT; i++)
+    for (size_t i = 0; i < n; i++)
         values[i] = NOMINALS[i];
     return FINE;
 }

@@ -182,6 +182,10 @@ DOOR enum verdict instance_no_such(struct instance *instance, const char *kind, 
 HIDDEN const char *instance_why_not(const struct content *content, const struct variable *variable, double value);
 /* Where a reference is in a list, or its length. */
 HIDDEN unsigned instance_place(const unsigned *references, unsigned n, unsigned reference);
+static inline bool is_among(const unsigned *references, unsigned n, unsigned reference)
+{
+    return instance_place(references, n, reference) < n;
+}
 DOOR enum verdict instance_check_settable(struct instance *instance, const struct variable *variable, double value);
 /* Bring what is read up to the communication point; and, after that, what is worked out on demand. */
 DOOR enum verdict instance_observe(struct instance *instance);

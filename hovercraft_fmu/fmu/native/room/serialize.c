@@ -66,7 +66,7 @@ void exchange_doubles(struct cursor *cursor, void *first, size_t bytes)
 
 static bool is_state(unsigned reference)
 {
-    return instance_place(STATES, STATE_COUNT, reference) < STATE_COUNT;
+    return is_among(STATES, STATE_COUNT, reference);
 }
 
 /* Before the start the state is what the host has set. */
@@ -106,7 +106,10 @@ static void exchange(struct cursor *cursor, struct content *c)
     c->tuned = tuned != 0;
 }
 
-static size_t serialized_size(const struct content *content)
+/* Windows has frames of a page where there is no C runtime: one copy to a function. */
+_Static_assert(sizeof(struct content) < 3900, "a copy of the content fits into a frame");
+
+static NEVER_INLINE size_t serialized_size(const struct content *content)
 {
     struct content copy = *content;
     struct cursor cursor = {.direction = MEASURE, .at = HEAD_SIZE};

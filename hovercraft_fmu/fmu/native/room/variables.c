@@ -111,7 +111,7 @@ static bool is_settable(const struct instance *instance, const struct variable *
     const bool solved = phase == CONTINUOUS_TIME || (phase == EVENT_MODE && instance->services.fmi == 3);
     const unsigned reference = (unsigned)(variable - VARIABLES);
     return variable->settable >> phase & 1u ||
-           (solved && instance_place(STATES, STATE_COUNT, reference) < STATE_COUNT);
+           (solved && is_among(STATES, STATE_COUNT, reference));
 }
 
 enum verdict instance_check_settable(struct instance *instance, const struct variable *variable, double value)
@@ -176,12 +176,11 @@ enum verdict instance_set_reals(struct instance *instance, const unsigned *refer
     }
     for (size_t i = 0; i < n; i++) {
         const unsigned input = instance_place(INPUTS, INPUT_COUNT, references[i]);
-        const unsigned state = instance_place(STATES, STATE_COUNT, references[i]);
         instance->now.reals[references[i]] = values[i];
         if (input < INPUT_COUNT)
             set_input(&instance->now, input, values[i]);
-        else if (state < STATE_COUNT)
-            states_of(&instance->now)[state] = values[i];
+        else if (is_among(STATES, STATE_COUNT, references[i]))
+            states_of(&instance->now)[instance_place(STATES, STATE_COUNT, references[i])] = values[i];
         else
             parameter = true;
     }
