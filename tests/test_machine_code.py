@@ -163,4 +163,5 @@ def test_each_purpose_stands_by_itself() -> None:
     for each in PRODUCTS.values():
         assert "same" not in each.purpose
         if each.name.endswith(".ssp"):
-            assert f" of {each.name.removesuffix('Loop.ssp')}.fmu and Autopilot.fmu" in each.purpose
+            craft = each.name.removesuffix("Loop.ssp")
+            assert f" of {craft}.fmu and {craft.replace('Hovercraft', 'Autopilot')}.fmu" in each.purpose

@@ -111,13 +111,13 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
         ),
         "native3_autopilot": Product(
             "AutopilotNative3.fmu",
-            "FMI 3.0, machine code: the same for FMI 3.0",
+            "FMI 3.0, machine code: takes the craft from waypoint to waypoint",
             _pilot(NATIVE3),
             lambda: identity(AUTOPILOT_NATIVE3),
         ),
         "autopilot": Product(
             "Autopilot.fmu",
-            "FMI 2.0, Python: the same, to read or change the law",
+            "FMI 2.0, Python: takes the craft from waypoint to waypoint; to read or change the law",
             build_autopilot,
             lambda: python_identity(AUTOPILOT_CONTENT),
         ),

@@ -10,7 +10,7 @@ from ..autopilot.pilot_interface import AUTOPILOT_MODEL, COMMANDS, ORDERS
 from ..fmu.archive import write_archive, zipped
 from ..fmu.description import AUTHOR, xml
 from ..fmu.document import rendered
-from ..fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, STATES
+from ..fmu.interface import CRAFT_PARAMETERS, HOVERCRAFT, STATES, WIND
 from ..fmu.variable import Variable
 from ..model.craft import preset
 from ..scenes import VOYAGES, Voyage
@@ -25,8 +25,6 @@ for _prefix, _uri in (("ssc", SSC), ("ssd", SSD), ("ssv", SSV), ("osp", OSP), ("
     register_namespace(_prefix, _uri)
 SHOWN = tuple(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output" and v.name not in COMMANDS)
 """Outputs of the autopilot that nothing in the loop takes."""
-WIND = ("wind.x", "wind.y")
-"""Inputs of the craft that nothing in the loop gives."""
 PARAMETERS, ORDERS_FILE, ICE_FILE = (f"resources/{name}.ssv" for name in (CRAFT, PILOT, "ice"))
 HERE = Path(__file__).parent
 PAGE = "loop.html"
@@ -94,8 +92,8 @@ def system_structure(voyage: Voyage, craft: str, autopilot: str) -> Element:
     system = SubElement(root, f"{{{SSD}}}System", {"name": "loop"})
     elements = SubElement(system, f"{{{SSD}}}Elements")
     (_, _, given), (_, _, told), _ = parameter_sets(voyage)
-    parameters = tuple(name for name in given if name not in WIND)
-    ends_of_craft = {"input": (*COMMANDS, *WIND), "output": STATES, "parameter": parameters}
+    parameters = tuple(name for name in given if name not in WIND)  # an input: fmpy.ssp would hold it at 0
+    ends_of_craft = {"input": COMMANDS, "output": STATES, "parameter": parameters}
     ends_of_pilot = {"input": STATES, "output": (*COMMANDS, *SHOWN), "parameter": tuple(told)}
     _component(elements, CRAFT, craft, HOVERCRAFT.by_name, ends_of_craft, PARAMETERS)
     _component(elements, PILOT, autopilot, AUTOPILOT_MODEL.by_name, ends_of_pilot, ORDERS_FILE)
