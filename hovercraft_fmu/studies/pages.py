@@ -31,7 +31,7 @@ from ..model.integrators import INTEGRATORS
 from ..scenes import CONTROL_LOGS, SCENES, VOYAGES
 from ..simulation import plan, run_model
 from ..sweeps import sweep
-from ..sweeps.charts import plot_sweep
+from ..sweeps.charts import draw_sweep
 from ..sweeps.study import SHIPPED
 from ..tether import tether_package
 from ..towing import BEND, haul
@@ -50,17 +50,26 @@ RESULTS = HERE / "results"
 PICTURES: Mapping[str, tuple[Path, ...]] = {
     "diagram.png": (),
     "ice.svg": (CONTROL_LOGS / "ice.csv",),
-    "turning_circle.png": (SHIPPED / "turning_circle.toml", SHIPPED / "turning_circle.csv"),
+    "turning_circle.svg": (SHIPPED / "turning_circle.toml", SHIPPED / "turning_circle.csv"),
     "stability.png": (RESULTS / "stability.csv", RESULTS / "extremes.csv"),
     "work_precision.svg": (RESULTS / "work_precision.csv", RESULTS / "holding.csv"),
     "coupling.svg": (RESULTS / "coupling.csv",),
     "scene_terms.svg": (RESULTS / "scene_terms.csv",),
 }
 """Each picture of the pages, and what it shows."""
+
+
+def _turning_circle(*_tables: pl.DataFrame) -> "Figure":
+    with temporary_folder() as folder:
+        done = sweep(SHIPPED / "turning_circle.toml", engine="batch", workers=1, output=Path(folder) / "sweep")
+        return draw_sweep(done.folder)
+
+
 DRAWN: Mapping[str, Callable[..., "Figure"]] = {
     "coupling.svg": closed_loop.draw,
     "ice.svg": lambda _log: run_model(plan("ice", communication_step=1.0)).plot(),
     "scene_terms.svg": scene_terms.draw,
+    "turning_circle.svg": _turning_circle,
     "work_precision.svg": work_precision.draw_work_precision,
 }
 """Those that are drawn of their tables alone, as lines."""
@@ -132,7 +141,8 @@ def assemble(results: Path = RESULTS) -> list[Path]:
     """
     files = {PACKED / name: content for name, content in pages().items()}
     for name, draw in DRAWN.items():
-        files[PACKED / name] = line_art(draw(*map(pl.read_csv, PICTURES[name])), shown(name))
+        tables = [pl.read_csv(path) for path in PICTURES[name] if path.suffix == ".csv"]
+        files[PACKED / name] = line_art(draw(*tables), shown(name))
     with temporary_folder() as folder:
         _draw(Path(folder))
         for name in PICTURES.keys() - DRAWN.keys():
@@ -164,8 +174,6 @@ def _draw(folder: Path) -> None:
     plot_passage(sail(VOYAGES["crosswind"], fmu, autopilot), folder / pilot_package.PICTURE)
     tether = tether_package.build_tether(folder / "Tether.fmu")
     plot_tow(haul(BEND, fmu, tether), folder / tether_package.PICTURE)
-    study = SHIPPED / "turning_circle.toml"
-    plot_sweep(sweep(study, engine="batch", workers=1, output=folder / "sweep").folder, folder / "turning_circle.png")
 
 
 def _measured() -> dict[str, list[dict[str, str]]]:

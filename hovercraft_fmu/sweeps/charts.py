@@ -43,6 +43,11 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
         OSError: the file cannot be written.
     """
     path = check_plot(path)
+    return save(draw_sweep(folder), path)
+
+
+def draw_sweep(folder: str | os.PathLike[str]) -> "Figure":
+    """The picture of `plot_sweep`. Raises as it does."""
     runs = load(folder)
     about = json.loads(runs.schema.metadata[KEY])
     study = json.loads(about["study"])
@@ -59,7 +64,7 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
         figure = _panels(table, [(name, tuple(swept)) for name in kept], 2, way)
     failed = runs.num_rows - runs["error"].null_count
     figure.suptitle(f"{about['name']}: {runs.num_rows} runs" + (f", {failed} failed" if failed else ""))
-    return save(figure, path)
+    return figure
 
 
 def _shown(table: pa.Table, name: str) -> NDArray[np.float64]:
@@ -113,7 +118,7 @@ def _heat_map(axes: "Axes", values: NDArray[np.float64], x: NDArray[np.float64],
     columns, rows = np.unique(x), np.unique(y)
     grid = np.full((len(rows), len(columns)), np.nan)
     grid[np.searchsorted(rows, y), np.searchsorted(columns, x)] = values
-    image = axes.pcolormesh(columns, rows, grid, cmap=SHADES, shading="nearest")
+    image = axes.pcolormesh(columns, rows, grid, cmap=SHADES, shading="nearest", rasterized=True)
     figure: Figure = axes.figure  # type: ignore[assignment]
     figure.colorbar(image, ax=axes)
     finite = grid[np.isfinite(grid)]
