@@ -10,8 +10,9 @@ from collections.abc import Iterable
 from .autopilot.pilot_native import AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3
 from .fmu.description import NATIVE, NATIVE3
 from .fmu.machine_code import Library, compile_all, fleet_library, library
+from .tether.tether_native import TETHER_NATIVE, TETHER_NATIVE3
 
-NATIVE_FLAVOURS = (NATIVE, NATIVE3, AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3)
+NATIVE_FLAVOURS = (NATIVE, NATIVE3, AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3, TETHER_NATIVE, TETHER_NATIVE3)
 
 
 def libraries() -> list[Library]:

@@ -23,7 +23,8 @@ from ..fmu.near_names import explains_keywords, must_be_one_of
 from ..fmu.python_package import build_fmu, hovercraft_content, python_identity
 from ..fmu.start_values import Value, variant
 from ..tether.tether_package import CONTENT as TETHER_CONTENT
-from ..tether.tether_package import build_tether
+from ..tether.tether_native import TETHER_NATIVE, TETHER_NATIVE3
+from ..tether.tether_package import build_native_tether, build_tether
 from ..view.page import FILE as PAGE
 from ..view.page import page
 from ..whole import temporary_folder
@@ -32,7 +33,7 @@ from .ssp import build_ssp
 Kind: TypeAlias = Literal[
     "native", "native3", "python",
     "native_autopilot", "native3_autopilot", "autopilot",
-    "tether",
+    "native_tether", "native3_tether", "tether",
     "native_loop", "native3_loop", "python_loop",
 ]  # fmt: skip
 FOLDER = Path("build")
@@ -121,9 +122,21 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
             build_autopilot,
             lambda: python_identity(AUTOPILOT_CONTENT),
         ),
+        "native_tether": Product(
+            "TetherNative.fmu",
+            "FMI 2.0, machine code: a line between two hovercraft",
+            lambda path: build_native_tether(path, TETHER_NATIVE),
+            lambda: identity(TETHER_NATIVE),
+        ),
+        "native3_tether": Product(
+            "TetherNative3.fmu",
+            "FMI 3.0, machine code: the same for FMI 3.0",
+            lambda path: build_native_tether(path, TETHER_NATIVE3),
+            lambda: identity(TETHER_NATIVE3),
+        ),
         "tether": Product(
             "Tether.fmu",
-            "FMI 2.0, Python: a line between two hovercraft",
+            "FMI 2.0, Python: the same, to read or change the law",
             build_tether,
             lambda: python_identity(TETHER_CONTENT),
         ),

@@ -12,7 +12,7 @@ from .block import guid
 from .craft_native import CRAFT_NATIVE
 from .interface import CRAFT_PARAMETERS, DERIVATIVES, EXTERNAL, HOVERCRAFT, INPUTS, STATES, TIME
 from .native_header import Native
-from .variable import Kind, Model, Variable
+from .variable import UNITS, Kind, Model, Unit, Variable
 
 AUTHOR = "The hovercraft-fmu authors"
 LICENSE = "MIT"
@@ -202,7 +202,7 @@ def model_description(build: str, flavour: Flavour = PYTHON) -> Element:
     if flavour.exchange:
         _interface(root, "ModelExchange", flavour, flavour.exchange)
     _interface(root, "CoSimulation", flavour, flavour.capabilities)
-    _units(SubElement(root, "UnitDefinitions"), model)
+    _units(SubElement(root, "UnitDefinitions"), flavour)
     _types(SubElement(root, "TypeDefinitions"), flavour)
     categories = SubElement(root, "LogCategories")
     for name, text in flavour.categories.items():
@@ -236,8 +236,14 @@ def _interface(parent: Element, name: str, flavour: Flavour, capabilities: Mappi
         SubElement(SubElement(node, "SourceFiles"), "File", {"name": flavour.unit})
 
 
-def _units(parent: Element, model: Model) -> None:
-    for name, unit in model.units.items():
+def _units_of(flavour: Flavour) -> Mapping[str, Unit]:
+    """Of its variables; in FMI 3.0 the time is one of them."""
+    own = flavour.model.units
+    return {**own, "s": UNITS["s"]} if flavour.fmi == 3 else own
+
+
+def _units(parent: Element, flavour: Flavour) -> None:
+    for name, unit in _units_of(flavour).items():
         node = SubElement(parent, "Unit", {"name": name})
         SubElement(node, "BaseUnit", {base: str(exponent) for base, exponent in unit.base.items()})
         if unit.display:
@@ -246,7 +252,7 @@ def _units(parent: Element, model: Model) -> None:
 
 
 def _types(parent: Element, flavour: Flavour) -> None:
-    for name, unit in flavour.model.units.items():
+    for name, unit in _units_of(flavour).items():
         attributes = {"name": unit.type_name, "description": f"{unit.quantity} in {name}"}
         real = _typed(parent, "SimpleType", "Real", attributes, flavour.fmi)
         real.set("quantity", unit.quantity)
@@ -284,7 +290,7 @@ def _variable(parent: Element, variable: Variable, flavour: Flavour) -> None:
     if variable.enumeration:
         node.set("declaredType", variable.enumeration.type_name)
     if variable.unit:
-        unit = flavour.model.units[variable.unit]
+        unit = _units_of(flavour)[variable.unit]
         node.set("declaredType", unit.type_name)
         node.set("quantity", unit.quantity)
         node.set("unit", variable.unit)

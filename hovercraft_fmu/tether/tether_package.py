@@ -1,15 +1,18 @@
-"""Builds the tether's FMU."""
+"""Builds the tether's FMUs."""
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
-from ..fmu.description import PYTHON
+from ..fmu.description import FMI_3_TYPES, Flavour
 from ..fmu.document import FOLDER, rendered
+from ..fmu.machine_code import PLATFORMS
+from ..fmu.native_package import Papers, write_native_fmu
 from ..fmu.python_package import Content, write_python_fmu
 from .line import __doc__ as law
 from .tether_interface import TETHER_MODEL
+from .tether_native import TETHER, TETHER_NATIVE
 
-TETHER = PYTHON.of(TETHER_MODEL)
 HERE = Path(__file__).parent
 PICTURE = "tow.png"
 """As `hovercraft-fmu demo --tow` draws it."""
@@ -22,10 +25,25 @@ def build_tether(path: str | os.PathLike[str] = f"build/{TETHER.identifier}.fmu"
     return write_python_fmu(path, CONTENT)
 
 
-def _documents() -> dict[str, bytes]:
-    values = {"model": TETHER_MODEL, "variables": TETHER_MODEL.variables, "types": {}, "law": law}
+def build_native_tether(
+    path: str | os.PathLike[str], flavour: Flavour = TETHER_NATIVE, platforms: Iterable[str] = tuple(PLATFORMS)
+) -> Path:
+    """Write the native tether of a standard to `path` and return the path. Raises as `build_native_fmu` does."""
+    return write_native_fmu(path, flavour, Papers(lambda: _documents(flavour), "Sine and cosine are"), platforms)
+
+
+def _documents(flavour: Flavour) -> dict[str, bytes]:
+    types = FMI_3_TYPES if flavour.fmi == 3 else {}
+    values = {
+        "model": TETHER_MODEL,
+        "flavour": flavour,
+        "variables": TETHER_MODEL.variables,
+        "types": types,
+        "law": law,
+    }
     pages = {name: page.encode() for name, page in rendered(HERE, values).items()}
-    return {REQUIREMENTS: (FOLDER / REQUIREMENTS).read_bytes(), PICTURE: (HERE / PICTURE).read_bytes(), **pages}
+    needs = {} if flavour.native else {REQUIREMENTS: (FOLDER / REQUIREMENTS).read_bytes()}
+    return {**needs, PICTURE: (HERE / PICTURE).read_bytes(), **pages}
 
 
 CONTENT = Content(
@@ -33,5 +51,5 @@ CONTENT = Content(
     "tether.tether_slave",
     "TetherSlave",
     tuple(f"tether/{name}.py" for name in ("__init__", "line", "tether_interface", "tether_slave")),
-    _documents,
+    lambda: _documents(TETHER),
 )
