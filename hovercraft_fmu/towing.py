@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .building import default_fmu
+from .building import default_fmu, default_tether_kind
 from .coupling import GAUSS_SEIDEL, JACOBI, SCHEMES, FmuPart, Part
 from .fmu.interface import CRAFT_PARAMETERS, EXTERNAL, HOVERCRAFT, STATES
 from .fmu.near_names import must_be_one_of
@@ -104,7 +104,7 @@ def haul(
         ValueError: a value that cannot be; FileNotFoundError: no such file.
         SimulationError: an FMU refused a value or a step, with its message.
     """
-    tether = default_fmu("tether") if tether is None else tether
+    tether = default_fmu(default_tether_kind()) if tether is None else tether
     with (
         Fmu(fmu or default_fmu(), HOVERCRAFT.name) as craft_fmu,
         Fmu(tether, TETHER_MODEL.name) as tether_fmu,

@@ -23,6 +23,9 @@ from hovercraft_fmu.fmu.python_package import build_fmu
 from hovercraft_fmu.libraries import compile_libraries
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
+from hovercraft_fmu.tether.tether_interface import TETHER_MODEL
+from hovercraft_fmu.tether.tether_native import TETHER_NATIVE, TETHER_NATIVE3
+from hovercraft_fmu.tether.tether_package import build_native_tether
 from tests.lowlevel import one
 from tests.shell import Shell
 
@@ -77,6 +80,8 @@ def _compiled(flavour: Flavour, name: str, built: Built, platforms: Collection[s
         compile_libraries(platforms)
         if BROWSER in platforms:  # as the package builds it
             return build("native" if flavour is NATIVE else "native3", path)
+        if flavour.model is TETHER_MODEL:
+            return build_native_tether(path, flavour, platforms)
         make_it = build_native_fmu if flavour.model is HOVERCRAFT else build_native_autopilot
         return make_it(path, flavour, platforms)
 
@@ -137,6 +142,13 @@ def native_autopilot(built: Built) -> Path:
 def native3_autopilot(built: Built) -> Path:
     """And of FMI 3.0."""
     return _compiled(AUTOPILOT_NATIVE3, "AutopilotNative3.fmu", built, HERE[sys.platform])
+
+
+@pytest.fixture(scope="session")
+def each_native_tether(standard: int, built: Built) -> Path:
+    """The native tether of FMI 2.0, then that of FMI 3.0, for this machine alone."""
+    flavour = TETHER_NATIVE if standard == 2 else TETHER_NATIVE3
+    return _compiled(flavour, f"{flavour.identifier}.fmu", built, HERE[sys.platform])
 
 
 @pytest.fixture(scope="session")

@@ -1,24 +1,34 @@
 """The tether: its law, its FMU, and a tow by three FMUs and a master."""
 
 import math
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 from hypothesis import given
 
 from hovercraft_fmu.coupling import GAUSS_SEIDEL, JACOBI
-from hovercraft_fmu.host import Fmu, SimulationError
+from hovercraft_fmu.elsewhere import HOSTS, rows_of_module
+from hovercraft_fmu.fmu.machine_code import OPTIONS, headers
+from hovercraft_fmu.fmu.native_package import binary
+from hovercraft_fmu.host import Fmu, SimulationError, read_description
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import State
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.studies.tow import WITH_DERIVATIVES, cases, growth, limits
 from hovercraft_fmu.tether.line import Line, pull
+from hovercraft_fmu.tether.tether_native import TETHER_NATIVE, TETHER_NATIVE3
 from hovercraft_fmu.tether.tether_package import build_tether
 from hovercraft_fmu.towing import BEND, COLUMNS, Tow, haul, haul_bare
 from tests.conftest import Built
+from tests.native import c_compiler
 from tests.strategies import states
+from tests.tow_masters import MASTERS, SHOWN, STRAIGHT
 
 BOTH = pytest.mark.parametrize("scheme", [JACOBI, GAUSS_SEIDEL])
 
@@ -116,6 +126,44 @@ def test_a_force_without_end_is_refused_and_the_last_one_stands(tether: Path) ->
         assert line.port("tension").get() == before
 
 
+# ---- machine code
+
+
+@pytest.fixture(scope="module")
+def with_libm(each_native_tether: Path, standard: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The native FMU, its own sources compiled with the platform's sine and cosine, which Python uses, too."""
+    folder, flavour = tmp_path_factory.mktemp("libm"), TETHER_NATIVE if standard == 2 else TETHER_NATIVE3
+    fmpy.extract(str(each_native_tether), unzipdir=str(folder))
+    for name, content in headers(flavour).items():
+        (folder / "sources" / name).write_bytes(content)
+    library = folder / "binaries" / binary("x86_64-linux", flavour)
+    command = [c_compiler(), *OPTIONS, "-shared", "-fPIC", "-DHOVERCRAFT_LIBM", "-o", str(library), flavour.unit,
+               f"-DFMI{standard}_OVERRIDE_FUNCTION_PREFIX", "-lm"]  # fmt: skip
+    subprocess.run(command, cwd=folder / "sources", check=True)
+    return Path(shutil.make_archive(str(folder / "libm"), "zip", folder)).rename(folder / "libm.fmu")
+
+
+@BOTH
+def test_with_libm_the_native_one_has_the_bits_of_the_python_one(scheme: str, fmu: Path, with_libm: Path) -> None:
+    found = haul(BEND, fmu, with_libm, scheme=scheme, stop_time=60.0)
+    expected = haul_bare(BEND, scheme=scheme, stop_time=60.0)
+    for name in COLUMNS:
+        assert found[name].tolist() == expected[name].tolist(), name
+
+
+def test_with_its_own_sine_it_is_the_same_but_for_roundings(fmu: Path, each_native_tether: Path) -> None:
+    found, expected = haul(BEND, fmu, each_native_tether, stop_time=60.0), haul_bare(BEND, stop_time=60.0)
+    for name in COLUMNS:
+        assert np.abs(found[name] - expected[name]).max() < 1e-10, name  # a unit in the last place, for a minute
+
+
+@pytest.mark.parametrize("name", ["stiffness", "damping", "slack_length"])
+def test_the_native_one_refuses_in_the_same_words(name: str, each_native_tether: Path) -> None:
+    said = f"{name} = -1.0: must not be negative"
+    with Fmu(each_native_tether) as opened, opened.instance() as line, pytest.raises(SimulationError, match=said):
+        line.start({name: -1.0})
+
+
 # ---- the tow
 
 
@@ -151,3 +199,19 @@ def test_how_long_a_step_may_be_and_what_held_forces_add() -> None:
         assert of_line[:, 1] == pytest.approx([0.067, 0.482, 0.427], rel=0.02)
     rates = growth(cases((0.0,), ((2.0, 1.0),), (GAUSS_SEIDEL, JACOBI, WITH_DERIVATIVES)), np.full(3, 0.05))
     assert rates == pytest.approx([0.05 / 4, 3 * 0.05 / 4, 0.0], abs=3e-4)  # the next term, and roundings
+
+
+@pytest.mark.parametrize("master", MASTERS)
+def test_another_master_gives_the_bits_of_ours(master: str, native_fmu: Path, each_native_tether: Path) -> None:
+    """A straight tow by two craft and a tether, all three machine code, side by side."""
+    if missing := HOSTS[master].missing():
+        pytest.skip(missing)
+    if read_description(each_native_tether).fmiVersion != "2.0" and master != "ecospy":
+        pytest.skip("libcosimpy 0.0.6 dies on an FMU of FMI 3.0; fmucontainer wants all of one standard")
+    if master == "ecospy" and not Path(sys.prefix, "lib", "libtbb.so.12").exists():
+        pytest.skip("the package tbb is not in this environment's own folder")
+    found = rows_of_module("tests.tow_masters", master, str(native_fmu), str(each_native_tether))
+    ours = haul(STRAIGHT, native_fmu, each_native_tether)
+    names = [name if part == "tether" else f"{part}.{name}" for part, name in SHOWN]
+    assert found == np.array([ours[name] for name in names]).T[1:].tolist()
+    assert max(row[-1] for row in found) > 5.0

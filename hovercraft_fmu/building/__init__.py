@@ -212,6 +212,11 @@ def default_autopilot_kind() -> Kind:
     return "native3_autopilot" if default_kind() == "native3" else "native_autopilot"
 
 
+def default_tether_kind() -> Kind:
+    """The same of the tether."""
+    return "native3_tether" if default_kind() == "native3" else "native_tether"
+
+
 def default_fmu(kind: Kind | None = None) -> Path:
     """The FMU of that kind in build/ under the current folder, which is built if it is not there.
 

@@ -22,7 +22,7 @@ DEMO_FOLDER = FOLDER / "demo"
 @click.option("--tow", is_flag=True, help="A tow: one craft pulls another one round a bend, by a line that is an FMU.")
 def demo(loop: bool, tow: bool) -> None:
     """Build the FMUs, check them, and drive them over a recorded control log; see build/demo/."""
-    from ..building import default_autopilot_kind, default_kind
+    from ..building import default_autopilot_kind, default_kind, default_tether_kind
     from ..drawing.figures import check_plot
     from ..scenes import CONTROL_LOGS, SCENES
     from ..simulation import holding, plan
@@ -35,7 +35,7 @@ def demo(loop: bool, tow: bool) -> None:
     if loop:
         return _demo_of_the_loop(native, _built_and_valid(default_autopilot_kind()), picture)
     if tow:
-        return _demo_of_the_tow(native, _built_and_valid("tether"), picture)
+        return _demo_of_the_tow(native, _built_and_valid(default_tether_kind()), picture)
     python = _built_and_valid("python")
     run = plan(CONTROL_LOGS / "ice.csv", preset="ice", communication_step=SCENES["ice"].communication_step)
     result, one, other = (simulated(*each) for each in ((run, native), (holding(run), native), (holding(run), python)))
