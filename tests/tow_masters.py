@@ -111,14 +111,14 @@ def fmucontainer(craft: Path, tether: Path) -> list[list[float]]:
             "name": "Tow.fmu", "fmu": [f"{part}.fmu" for part in STARTS], "step_size": STEP, "auto_input": False,
             "auto_output": False,
             "link": [[f"{start}.fmu", output, f"{end}.fmu", taken] for start, output, end, taken in CONNECTIONS],
-            "output": [[f"{part}.fmu", name, f"{part}.{name}"] for part, name in SHOWN],
+            "output": [[f"{part}.fmu", name, f"shown.{part}.{name}"] for part, name in SHOWN],
             "start": [[f"{part}.fmu", name, x] for part, values in STARTS.items() for name, x in values.items()],
         }  # fmt: skip
         make_container(folder, content)
         result = fmpy.simulate_fmu(
             str(folder / "Tow.fmu"), stop_time=STEPS * STEP, output_interval=STEP, step_size=STEP
         )
-    return [[float(row[f"{part}.{name}"]) for part, name in SHOWN] for row in result[1:]]
+    return [[float(row[f"shown.{part}.{name}"]) for part, name in SHOWN] for row in result[1:]]
 
 
 MASTERS: dict[str, Callable[[Path, Path], list[list[float]]]] = {
