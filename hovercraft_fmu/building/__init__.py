@@ -22,8 +22,8 @@ from ..fmu.native_package import build_native_fmu
 from ..fmu.near_names import explains_keywords, must_be_one_of
 from ..fmu.python_package import build_fmu, hovercraft_content, python_identity
 from ..fmu.start_values import Value, variant
-from ..tether.tether_package import CONTENT as TETHER_CONTENT
 from ..tether.tether_native import TETHER_NATIVE, TETHER_NATIVE3
+from ..tether.tether_package import CONTENT as TETHER_CONTENT
 from ..tether.tether_package import build_native_tether, build_tether
 from ..view.page import FILE as PAGE
 from ..view.page import page
