@@ -52,7 +52,7 @@ def _written_out(program: Path, run: Run) -> list[tuple[Fraction, ...]]:
     lines = [(*_constants(run.craft), *run.start, float(method))]
     for time, end, held in held_steps(run):
         n, h = substeps(end - time, run.settings.step_size)
-        lines.append((float(n), h, *held))
+        lines.append((float(n), h, *held[:5]))  # no scene has loads from outside
     text = "\n".join(" ".join(value.hex() for value in line) for line in lines)
     done = subprocess.run([program], input=text, capture_output=True, text=True, check=True)
     rows = [[Fraction(float.fromhex(value)) for value in line.split()] for line in done.stdout.splitlines()]
