@@ -1,4 +1,4 @@
-"""Any sequence of FMI calls with any arguments; `python -m tests.fuzz` takes ten minutes for each standard."""
+"""Any sequence of FMI calls with any arguments; `python -m tests.fuzz calls` takes ten minutes for each standard."""
 
 from pathlib import Path
 
