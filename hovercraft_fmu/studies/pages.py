@@ -129,8 +129,8 @@ LONG_NUMBER = re.compile(r"(?<=[ \"LM,(])(-?\d+\.\d)\d+(?=[ \"\n,)L])")
 def line_art(figure: "Figure", shows: str) -> bytes:
     """An SVG, which says what it shows; the same bytes each time."""
     content = io.BytesIO()
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hovercraft", "path.simplify_threshold": 0.5}):
-        figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None, "Source": shows})
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hovercraft", "path.simplify_threshold": 1.0}):
+        figure.savefig(content, format="svg", dpi=72, metadata={"Date": None, "Creator": None, "Source": shows})
     return LONG_NUMBER.sub(r"\1", content.getvalue().decode()).encode()
 
 
