@@ -130,13 +130,13 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
         ),
         "native3_tether": Product(
             "TetherNative3.fmu",
-            "FMI 3.0, machine code: the same for FMI 3.0",
+            "FMI 3.0, machine code: a line between two hovercraft",
             lambda path: build_native_tether(path, TETHER_NATIVE3),
             lambda: identity(TETHER_NATIVE3),
         ),
         "tether": Product(
             "Tether.fmu",
-            "FMI 2.0, Python: the same, to read or change the law",
+            "FMI 2.0, Python: a line between two hovercraft; to read or change the law",
             build_tether,
             lambda: python_identity(TETHER_CONTENT),
         ),
