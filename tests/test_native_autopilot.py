@@ -18,14 +18,14 @@ from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, DEMO_COURS
 from hovercraft_fmu.autopilot.pilot_native import AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3
 from hovercraft_fmu.building.ssp import build_ssp
 from hovercraft_fmu.coupling import sail
-from hovercraft_fmu.fmu.description import NATIVE
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3
 from hovercraft_fmu.fmu.interface import STATES
 from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, headers
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.host import Fmu, Instance, SimulationError
 from hovercraft_fmu.scenes import VOYAGES
 from tests.lowlevel import one, start
-from tests.native import C_TESTS, c_compiler, compile_c
+from tests.native import C_INCLUDES, C_TESTS, c_compiler, compile_c
 
 OUTPUTS = tuple(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output")
 ON_ICE = {"mass": 100.0, "cruise_speed": 2.0, "thrust_min": -10.0}
@@ -98,22 +98,24 @@ def test_with_its_own_arctangent_it_is_the_same_but_for_roundings(
 
 
 def test_the_loop_of_native_fmus_runs_where_there_is_no_python(
-    native_fmu: Path, native_autopilot: Path, tmp_path: Path
+    each_native_fmu: Path, each_native_autopilot: Path, standard: int, tmp_path: Path
 ) -> None:
     """A host in C with nothing but the two FMUs of the SSP in its process; the bits are those of our own master."""
-    ssp = build_ssp(tmp_path / "Loop.ssp", native_fmu, native_autopilot, VOYAGES["calm"])
+    ssp = build_ssp(tmp_path / "Loop.ssp", each_native_fmu, each_native_autopilot, VOYAGES["calm"])
+    craft, pilot = (NATIVE, AUTOPILOT_NATIVE) if standard == 2 else (NATIVE3, AUTOPILOT_NATIVE3)
     arguments: list[str] = []
     with zipfile.ZipFile(ssp) as archive:
-        for fmu, flavour in ((native_fmu, NATIVE), (native_autopilot, AUTOPILOT_NATIVE)):
+        for fmu, flavour in ((each_native_fmu, craft), (each_native_autopilot, pilot)):
             archive.extract(f"resources/{fmu.name}", tmp_path)
             path = tmp_path / "resources" / fmu.name
             folder = fmpy.extract(str(path), unzipdir=str(tmp_path / flavour.identifier))
             guid = fmpy.read_model_description(str(path)).guid
             arguments += [str(Path(folder) / "binaries" / binary("x86_64-linux", flavour)), str(guid)]
-    host = compile_c(tmp_path / "loop", [C_TESTS / "loop.c"], "-I", str(C_FOLDER / "fmi2"), "-ldl")
+    includes = (*C_INCLUDES, "-I", str(C_FOLDER / f"fmi{standard}"))
+    host = compile_c(tmp_path / "loop", [C_TESTS / "loop.c"], f"-DFMI={standard}", *includes, "-ldl")
     done = subprocess.run([host, *arguments, "0.5", "600"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    passage = sail("calm", native_fmu, native_autopilot, stop_time=300.0)
+    passage = sail("calm", each_native_fmu, each_native_autopilot, stop_time=300.0)
     assert [float(each) for each in done.stdout.split()] == [passage[name][-1] for name in STATES]
 
 
