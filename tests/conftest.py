@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import pytest
 from filelock import FileLock
@@ -28,6 +28,9 @@ from hovercraft_fmu.tether.tether_native import TETHER_NATIVE, TETHER_NATIVE3
 from hovercraft_fmu.tether.tether_package import build_native_tether
 from tests.lowlevel import one
 from tests.shell import Shell
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, ConsoleMessage, Error, Page
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -58,6 +61,34 @@ def built(shared_folder: Path) -> Built:
             return path if path.exists() else make(path)
 
     return once
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator["Browser"]:
+    """One for all tests of a module; longer, its loop would be in the way of those of others."""
+    from tests.browsers import chromium
+
+    try:
+        with chromium() as opened:
+            yield opened
+    except FileNotFoundError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="module")
+def window(browser: "Browser") -> Iterator[tuple["Page", list[str]]]:
+    """A window for all tests, with keys and a finger; and what is written to its console."""
+    written: list[str] = []
+
+    def heard(message: "ConsoleMessage | Error") -> None:
+        written.append(getattr(message, "text", str(message)))
+
+    with browser.new_context(has_touch=True) as context:
+        made = context.new_page()
+        made.set_default_timeout(30_000)
+        made.on("console", heard)
+        made.on("pageerror", heard)
+        yield made, written
 
 
 @pytest.fixture(scope="session")

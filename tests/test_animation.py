@@ -1,22 +1,28 @@
 """Pictures that move: what they show is where the craft is; metres are metres; two settings can be told apart."""
 
+import io
 import itertools
 import json
 import re
-from html.parser import HTMLParser
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from PIL import Image, ImageColor
+from playwright.sync_api import Page, expect
 
 from hovercraft_fmu.drawing.palette import METHODS
+from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.simulation import Result, plan, run_model
 from hovercraft_fmu.view.animation import FRAMES, MovingPicture, Track, animate
+from hovercraft_fmu.view.film import Moving, Towline, film
 from tests.conftest import ROOT
 from tests.shell import Shell
 
+Pixels = NDArray[np.float64]
 COLORS = (METHODS["semi_implicit_euler"].color, METHODS["rk4"].color)
 
 
@@ -58,8 +64,6 @@ def test_fewer_communication_points_make_fewer_frames(tmp_path: Path) -> None:
     path = animate([few], tmp_path / "few.gif")
     assert len(frames(path)) == 7
     assert animate([few], tmp_path / "again.gif").read_bytes() == path.read_bytes()
-    page = animate([few], tmp_path / "few.html").read_text(encoding="utf-8")
-    assert re.findall(r'"label":"(\d+)"', page) == ["0", "10", "20", "30", "40", "50", "60"]
 
 
 def test_the_craft_is_drawn_where_it_is_and_metres_are_metres(two: list[Result]) -> None:
@@ -84,34 +88,136 @@ def test_the_distance_told_is_that_of_the_runs(two: list[Result], tmp_path: Path
         assert name in page
 
 
-class Loads(HTMLParser):
-    """What a browser would fetch."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.found: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found += [f"{tag} {value}" for name, value in attrs if name in ("src", "href")]
+# ---- the page
 
 
-def test_a_page_needs_no_network_and_has_every_frame(two: list[Result], tmp_path: Path) -> None:
-    path = animate(two, tmp_path / "two.html")
-    page = path.read_text(encoding="utf-8")
-    loads = Loads()
-    loads.feed(page)
-    assert loads.found == []
-    added = re.search(r"Plotly\.addFrames\('animation', (\[.*?\])\)", page, re.DOTALL)
-    assert added
-    shown = json.loads(added[1])
-    labels = re.findall(r'"label":"([\d.]+)"', page)
-    assert labels == [f"{time:g}" for time in np.arange(0.0, 240.1, 5.0)]  # round, and FRAMES at most
-    assert len(shown) == len(labels) <= FRAMES
-    hull = tracks(two)[0].hull(len(two[0]["time"]) - 1)
-    assert shown[-1]["data"][3]["x"] == [x for x, _ in hull]
-    assert shown[-1]["data"][3]["y"] == [y for _, y in hull]
-    assert '"scaleanchor":"x"' in page
-    assert animate(two, tmp_path / "again.html").read_bytes() == path.read_bytes()
+@pytest.fixture
+def played(window: tuple[Page, list[str]], tmp_path: Path) -> Iterator[Callable[..., Page]]:
+    """Opens a page; whatever is written to the console fails the test."""
+    made, written = window
+
+    def play(page: bytes, width: int = 900, height: int = 600, scheme: Literal["light", "dark"] = "light") -> Page:
+        path = tmp_path / "played.html"
+        path.write_bytes(page)
+        made.set_viewport_size({"width": width, "height": height})
+        made.emulate_media(color_scheme=scheme)
+        made.goto(path.as_uri())
+        made.wait_for_function("globalThis.animation")
+        return made
+
+    yield play
+    made.goto("about:blank")
+    assert written == []
+
+
+def page_of(results: Result | list[Result], folder: Path) -> bytes:
+    return animate(results, folder / "page.html").read_bytes()
+
+
+def data_of(page: bytes) -> dict[str, Any]:
+    found = re.search(r'id="data">(.*?)</script>', page.decode(), re.DOTALL)
+    assert found
+    data: dict[str, Any] = json.loads(found[1])
+    return data
+
+
+def colored(made: Page, color: str) -> Pixels:
+    """Column and row of the pixels of a colour in the view, from its middle, shape (n, 2)."""
+    made.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    with Image.open(io.BytesIO(made.locator("#view").screenshot())) as image:
+        shown = np.array(image.convert("RGB")).astype(int)
+    rows, columns = np.nonzero(np.abs(shown - ImageColor.getrgb(color)).sum(axis=2) < 6)
+    return np.column_stack([columns, rows]) + 0.5 - np.array(shown.shape[1::-1]) / 2
+
+
+def middle(result: Result, i: int) -> Pixels:
+    """m: of the hull's area; the pentagon is a box and a triangle of a quarter of the length."""
+    length, heading = result.run.craft.length, result["pose.heading"][i]
+    ahead = (0.25 / 2 * (0.5 + 0.25 / 3) / (1 + 0.25 / 2)) * length
+    return np.array([result["pose.x"][i], result["pose.y"][i]]) + ahead * np.array([np.cos(heading), np.sin(heading)])
+
+
+HULL, ACCENT = "#fbfbff", "#0b4f8c"
+
+
+def test_the_page_draws_the_craft_where_it_is(two: list[Result], played: Callable[..., Page], tmp_path: Path) -> None:
+    """As many pixels a metre everywhere, y down, in the middle that of the path; or the craft, where it is followed."""
+    made, result = played(page_of(two[0], tmp_path)), two[0]
+    path = np.column_stack([result["pose.x"], result["pose.y"]])
+    center, scales = (path.min(axis=0) + path.max(axis=0)) / 2, []
+    for i in (200, 1100, 2100):
+        made.evaluate("(time) => animation.go(time)", float(result["time"][i]))
+        there, expected = colored(made, HULL).mean(axis=0), middle(result, i) - center
+        scale = float(there @ expected / (expected @ expected))
+        assert there == pytest.approx(scale * expected, abs=1.5)
+        scales.append(scale)
+        made.keyboard.press("f")
+        assert np.abs(colored(made, HULL).mean(axis=0)).max() < 6.0, "followed: off by less than hull's middle is"
+        made.keyboard.press("f")
+    assert scales == pytest.approx([scales[0]] * 3, rel=0.01)
+
+
+def test_the_slider_has_round_numbers(two: list[Result], played: Callable[..., Page], tmp_path: Path) -> None:
+    made = played(page_of(two, tmp_path))
+    labels, time = made.locator("#labels span"), made.locator("#time")
+    assert labels.all_inner_texts() == ["0", "50", "100", "150", "200"]
+    made.keyboard.press("ArrowRight")
+    expect(time).to_have_text("1 s")
+    made.locator("#slider").fill("120")
+    expect(time).to_have_text("120 s")
+    made = played(page_of(run_model(plan("launch", stop_time=7.3)), tmp_path), 360, 640, "dark")
+    assert made.evaluate("document.documentElement.scrollWidth") <= 360
+    texts = labels.all_inner_texts()
+    assert texts in (["0", "5"], ["0", "2", "4", "6"])
+    made.keyboard.press("ArrowRight")
+    expect(time).to_have_text("0.05 s")
+    made.keyboard.press("End")
+    expect(time).to_have_text("7.30 s")
+
+
+def test_it_plays_to_the_end_and_again(played: Callable[..., Page], tmp_path: Path) -> None:
+    made = played(page_of(run_model(plan("launch", communication_step=10.0)), tmp_path))
+    expect(made.locator("#speed option:checked")).to_have_text("\N{MULTIPLICATION SIGN} 2")
+    for _ in range(5):
+        made.keyboard.press("+")
+    expect(made.locator("#speed option:checked")).to_have_text("\N{MULTIPLICATION SIGN} 100")
+    made.keyboard.press(" ")
+    expect(made.locator("#play")).to_have_text("Pause")
+    expect(made.locator("#time")).to_have_text("60.0 s")
+    expect(made.locator("#play")).to_have_text("Play")
+    made.locator("#play").click()
+    expect(made.locator("#play")).to_have_text("Pause")
+
+
+def test_the_line_of_a_tow_is_drawn_from_end_to_end(played: Callable[..., Page]) -> None:
+    """And looser where it does not pull: dots have gaps."""
+    craft, time = Craft(), np.array([0.0, 1.0, 2.0])
+    rest = np.zeros(3)
+    crafts = [Moving(name, craft, (rest + x, rest, rest, rest, rest)) for name, x in (("first", 60.0), ("second", 0.0))]
+    line = Towline(((-10.0, 0.0), (15.0, 0.0)), np.array([5.0, 5.0, 0.0]))
+    made = played(film("tow", time, crafts, towline=line))
+    expect(made.locator("#between")).to_have_text("the line pulls at 5.0 N")
+    taut = colored(made, ACCENT)
+    made.keyboard.press("End")
+    expect(made.locator("#between")).to_have_text("the line pulls at 0.0 N")
+    loose = colored(made, ACCENT)
+    hulls = np.sort(colored(made, HULL)[:, 0])
+    assert 0.2 * len(taut) < len(loose) < 0.6 * len(taut)
+    assert np.ptp(taut[:, 0]) / (hulls[-1] - hulls[0]) == pytest.approx(35.0 / 85.0, abs=0.02)  # -10 .. 75 m
+
+
+def test_a_page_is_small_and_needs_no_network(two: list[Result], tmp_path: Path) -> None:
+    """What is in it is the run, to a thousandth of a craft's length."""
+    page = page_of(two, tmp_path)
+    assert len(page) < 200_000
+    assert not re.search(r'(src|href)="|\bfetch\(|https?://|^(import|export) ', page.decode(), re.MULTILINE)
+    data = data_of(page)
+    for run, crafts in zip(two, data["crafts"], strict=True):
+        for name in ("x", "y", "heading"):
+            there = np.interp(data["time"], run["time"], run[f"pose.{name}"])
+            assert np.abs(crafts[name] - there).max() <= 0.01
+    assert [each["ghost"] for each in data["crafts"]] == [False, True]
+    assert page == page_of(two, tmp_path)
 
 
 def test_what_else_differs_is_named(tmp_path: Path) -> None:

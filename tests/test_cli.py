@@ -362,7 +362,6 @@ HIDDEN = {
     "matplotlib of an animation": (("simulate", "--stop-time", "1", "--animate", "a.gif"), "[plot]"),
     "matplotlib of a measurement": (("measure", "stability"), "[studies]"),
     "matplotlib of the demo": (("demo",), "[plot]"),
-    "plotly": (("simulate", "--stop-time", "1", "--animate", "a.html"), "[html]"),
     "pyarrow": (("sweep", "turning_circle"), "[sweep]"),
     "polars": (("measure", "coupling"), "[studies]"),
     "scipy": (("measure", "trade"), "[studies]"),

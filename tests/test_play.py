@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Error, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 from hovercraft_fmu.fmu.description import NATIVE
 from hovercraft_fmu.fmu.interface import INPUTS, STATES, VARIABLES
@@ -20,7 +20,6 @@ from hovercraft_fmu.libraries import compile_libraries
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.view.page import FILE, FOLDER, page
-from tests.browsers import chromium
 from tests.conftest import Built
 from tests.native import STEPS
 from tests.shell import Shell
@@ -44,32 +43,6 @@ def file(built: Built) -> Path:
         return built(FILE, make)
     except NotCompiledError as error:
         pytest.skip(str(error))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for all tests."""
-    try:
-        with chromium() as opened:
-            yield opened
-    except FileNotFoundError as error:
-        pytest.skip(str(error))
-
-
-@pytest.fixture(scope="module")
-def window(browser: Browser) -> Iterator[tuple[Page, list[str]]]:
-    """A window for all tests, with keys and a finger; and what is written to its console."""
-    written: list[str] = []
-
-    def heard(message: ConsoleMessage | Error) -> None:
-        written.append(str(message) if isinstance(message, Error) else message.text)
-
-    with browser.new_context(has_touch=True) as context:
-        made = context.new_page()
-        made.set_default_timeout(30_000)
-        made.on("console", heard)
-        made.on("pageerror", heard)
-        yield made, written
 
 
 @pytest.fixture
@@ -419,7 +392,7 @@ def test_the_modules_are_one_script(file: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="|\bfetch\(|await import\(|https?://', text)
     assert not re.search(r"^(import|export) ", text, re.MULTILINE)
-    for name in FOLDER.glob("*.js"):
+    for name in {*FOLDER.glob("*.js")} - {FOLDER / "animation.js"}:
         assert name.read_text(encoding="utf-8").splitlines()[0] in text, name
 
 

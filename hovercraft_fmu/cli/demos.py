@@ -30,7 +30,7 @@ def demo(loop: bool, tow: bool) -> None:
     if loop and tow:
         raise click.UsageError("--loop and --tow: must not be given together")
     picture = check_plot(DEMO_FOLDER / ("loop.png" if loop else "tow.png" if tow else "ice.png"))
-    make_room(picture, picture.with_suffix(".csv"), *([picture.with_suffix(".gif")] if tow else []))
+    make_room(*(picture.with_suffix(suffix) for suffix in (".png", ".csv", ".gif", ".html")))
     native = _built_and_valid(default_kind())
     if loop:
         return _demo_of_the_loop(native, _built_and_valid(default_autopilot_kind()), picture)
@@ -68,7 +68,7 @@ def _built_and_valid(kind: "Kind") -> Path:
 def _demo_of_the_loop(fmu: Path, autopilot: Path, picture: Path) -> None:
     from ..coupling import sail
     from ..scenes import VOYAGES
-    from ..view.plots import plot_passage
+    from ..view.plots import animate_passage, plot_passage
 
     voyage = VOYAGES["crosswind"]
     with progress_of(voyage.stop_time) as progress:
@@ -76,6 +76,7 @@ def _demo_of_the_loop(fmu: Path, autopilot: Path, picture: Path) -> None:
     _print_passage(passage)
     OUTPUT.print(f"wrote {passage.write_csv(DEMO_FOLDER / 'loop.csv')}")
     OUTPUT.print(f"wrote {plot_passage(passage, picture)}")
+    OUTPUT.print(f"wrote {animate_passage(passage, picture.with_suffix('.html'))}")
 
 
 def _demo_of_the_tow(fmu: Path, tether: Path, picture: Path) -> None:
@@ -95,7 +96,8 @@ def _demo_of_the_tow(fmu: Path, tether: Path, picture: Path) -> None:
     )
     OUTPUT.print(f"wrote {towed.write_csv(picture.with_suffix('.csv'))}")
     OUTPUT.print(f"wrote {plot_tow(towed, picture)}")
-    OUTPUT.print(f"wrote {animate_tow(towed, picture.with_suffix('.gif'))}")
+    for suffix in (".gif", ".html"):
+        OUTPUT.print(f"wrote {animate_tow(towed, picture.with_suffix(suffix))}")
 
 
 def _print_passage(passage: "Passage") -> None:

@@ -3,9 +3,9 @@
 import importlib
 import os
 from collections.abc import Callable, Sequence
-from math import ceil, cos, floor, hypot, log10, nan, pi, sin
+from math import ceil, cos, floor, hypot, nan, pi, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from ..fmu.icon import outline
 from ..fmu.near_names import explains_keywords
 from ..simulation import Result, metres
 from ..whole import written
+from .film import MOTION, Moving, film
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,15 +34,10 @@ LEGEND_LINE = 100
 """characters"""
 STRENGTHS = 8
 """Of a colour, in a GIF."""
-PATH_POINTS = 2000
-"""Of a path in a page, at most."""
 ROUND = 49
 """Points of a circle."""
 DECADES = 1e-5
 """Of the largest distance: what the logarithmic axis begins at."""
-POINTED_AT = "%{x:.2f} s: %{y:.3g} m apart<extra></extra>"
-UNWANTED = ("sendChartToCloud", "select2d", "lasso2d")
-"""Buttons of a page: one sends it away, the others do nothing here."""
 SUFFIXES = (".gif", ".html")
 
 Corner = NDArray[np.float64]
@@ -93,12 +89,13 @@ def check_animation(path: str | os.PathLike[str]) -> Path:
 
     Raises:
         ValueError: the name ends in neither .gif nor .html.
-        ModuleNotFoundError: matplotlib (for a GIF) or plotly (for a page) is not installed; says how to install it.
+        ModuleNotFoundError: matplotlib, for a GIF, is not installed; says how to install it.
     """
     path = Path(path)
     if path.suffix not in SUFFIXES:
         raise ValueError(f"animation = {str(path)!r}: must end in .gif (a moving picture) or .html (a page)")
-    (new_figure if path.suffix == ".gif" else _plotly)()
+    if path.suffix == ".gif":
+        new_figure()
     return path
 
 
@@ -166,19 +163,6 @@ def _frames(tracks: Sequence[Track]) -> NDArray[np.int_]:
     time = tracks[0].result["time"]
     wanted = np.linspace(time[0], time[-1], min(FRAMES, len(time)))
     chosen: NDArray[np.int_] = np.unique(np.searchsorted(time, wanted - 1e-9 * (time[-1] - time[0])))
-    return chosen
-
-
-def _round_frames(tracks: Sequence[Track]) -> NDArray[np.int_]:
-    """Those of a page, whose slider has round numbers: communication points at multiples of 1, 2 or 5 times a power of
-    ten [s], as many as FRAMES at most, and the end."""
-    time = tracks[0].result["time"]
-    least = max(float(time[-1] - time[0]) / FRAMES, float(np.diff(time).max()))
-    power = 10.0 ** floor(log10(least))
-    step = next(each * power for each in (1, 2, 5, 10) if each * power >= 0.999999 * least)
-    wanted = step * np.arange(ceil(time[0] / step), floor(time[-1] / step) + 1)
-    places = np.clip(np.searchsorted(time, wanted - 0.5 * np.diff(time).max()), 0, len(time) - 1)
-    chosen: NDArray[np.int_] = np.unique(np.append(places, len(time) - 1))
     return chosen
 
 
@@ -353,109 +337,15 @@ def _draw_apart(axes: "Axes", tracks: Sequence[Track]) -> "Line2D":
 # ---- as a page
 
 
-def _plotly() -> tuple[Any, Any]:
-    """plotly's modules graph_objects and subplots. Raises ModuleNotFoundError, which says how to install it."""
-    try:
-        return importlib.import_module("plotly.graph_objects"), importlib.import_module("plotly.subplots")
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            "pages need plotly, which is not installed: pip install 'hovercraft-fmu[html]'"
-        ) from error
-
-
 def _write_page(tracks: Sequence[Track], path: Path, tell: Tell) -> None:
-    """Every figure's data and plotly's script are in the page."""
-    graphs, subplots = _plotly()
-    two = len(tracks) == 2
-    figure = subplots.make_subplots(cols=2 if two else 1, column_widths=[0.68, 0.32] if two else None)
-    for i, track in enumerate(tracks):
-        figure.add_trace(graphs.Scatter(**_path_trace(track, "solid" if i == 0 else "dash")))
-    if two:
-        kept = _kept(tracks[0])
-        line = {"x": tracks[0].result["time"][kept], "y": apart(tracks)[kept]}
-        figure.add_trace(graphs.Scatter(**line, showlegend=False, line_color=QUIET, hovertemplate=POINTED_AT), 1, 2)
-    fixed = len(figure.data)
-    chosen = _round_frames(tracks)
-    for trace, column in _moving_traces(tracks, chosen[0]):
-        figure.add_trace(graphs.Scatter(**trace), 1, column)
-    moving = list(range(fixed, len(figure.data)))
-    frames = []
-    for done, i in enumerate(chosen, 1):
-        data = [graphs.Scatter(x=trace["x"], y=trace["y"]) for trace, _ in _moving_traces(tracks, i)]
-        frames.append(graphs.Frame(name=str(i), data=data, traces=moving))
-        tell(done / len(chosen))
-    figure.frames = frames
-    figure.update_layout(**_page_layout(tracks, chosen))
-    if two:
-        figure.update_xaxes(title="time [s]", col=2)
-        scale = "log" if apart(tracks).any() else "linear"
-        figure.update_yaxes(title="apart [m]", type=scale, exponentformat="power", col=2)
-    config = {"scrollZoom": True, "displaylogo": False, "modeBarButtonsToRemove": UNWANTED}
-    figure.write_html(path, include_plotlyjs=True, auto_play=False, div_id="animation", config=config)
+    moving = [_moving(track, is_ghost=track is not tracks[0]) for track in tracks]
+    distance = apart(tracks) if len(tracks) == 2 else None
+    path.write_bytes(film(_title(tracks), tracks[0].result["time"], moving, apart=distance))
+    tell(1.0)
 
 
-def _kept(track: Track) -> NDArray[np.int_]:
-    """The communication points of a path that are in a page."""
-    n = len(track.x)
-    points: NDArray[np.int_] = np.linspace(0, n - 1, min(n, PATH_POINTS)).astype(int)
-    return np.unique(points)
-
-
-def _path_trace(track: Track, dash: str) -> dict[str, Any]:
-    kept, result = _kept(track), track.result
-    told = np.stack([result[name][kept] for name in ("time", "speed", "applied.thrust")], axis=1)
-    return {
-        "x": track.x[kept], "y": track.y[kept], "name": track.name, "mode": "lines", "customdata": told,
-        "line": {"color": track.color, "dash": dash, "width": 1.5},
-        "hovertemplate": "(%{x:.6g}, %{y:.6g}) m at %{customdata[0]:.2f} s: %{customdata[1]:.3f} m/s, "
-        "%{customdata[2]:.1f} N<extra></extra>",
-    }  # fmt: skip
-
-
-def _moving_traces(tracks: Sequence[Track], i: int) -> list[tuple[dict[str, Any], int]]:
-    """Traces and the column each is drawn in, always of the same number and order."""
-    traces: list[tuple[dict[str, Any], int]] = []
-    plain = {"mode": "lines", "showlegend": False, "hoverinfo": "skip"}
-    for n, track in enumerate(tracks):
-        blowing = track.jets(i)
-        for name, color in JETS.items():
-            corners = _columns(blowing.get(name, []))
-            traces.append(({**plain, **corners, "fill": "toself", "fillcolor": color, "line_width": 0}, 1))
-        fill = {"fill": "toself", "fillcolor": track.color} if n == 0 else {}
-        traces.append(({**plain, **_columns(track.hull(i)), **fill, "line": {"color": track.color, "width": 2}}, 1))
-        if track.result.is_estimated:
-            doubt = {"fill": "toself", "fillcolor": track.color, "opacity": 0.3, "line_width": 0}
-            traces.append(({**plain, **_columns(track.doubt(i)), **doubt}, 1))
-    if len(tracks) == 2:
-        mark = {"x": [tracks[0].result["time"][i]], "y": [apart(tracks)[i]]}
-        traces.append(({**plain, **mark, "mode": "markers", "marker": {"color": INK, "size": 8}}, 2))
-    return traces
-
-
-def _columns(points: Shape) -> dict[str, list[float]]:
-    return {"x": [x for x, _ in points], "y": [y for _, y in points]}
-
-
-def _page_layout(tracks: Sequence[Track], chosen: NDArray[np.int_]) -> dict[str, Any]:
-    (left, top), (right, bottom) = _corners(tracks)
-    now = {"mode": "immediate", "transition": {"duration": 0}}
-    play = {**now, "frame": {"duration": FRAME_TIME, "redraw": False}, "fromcurrent": True}
-    stop = {**now, "frame": {"duration": 0, "redraw": False}}
-    time = tracks[0].result["time"]
-    steps = [{"method": "animate", "label": f"{time[i]:.4g}", "args": [[str(i)], stop]} for i in chosen]
-    buttons = [
-        {"label": "play", "method": "animate", "args": [None, play]},
-        {"label": "pause", "method": "animate", "args": [[None], stop]},
-    ]
-    return {
-        "title": _title(tracks),
-        "template": "plotly_white",
-        "xaxis": {"title": "x [m]", "range": [left, right], "constrain": "domain"},
-        "yaxis": {"title": "y [m], downward", "range": [bottom, top], "scaleanchor": "x", "constrain": "domain"},
-        "legend": {"orientation": "h", "y": 1.06},
-        "sliders": [{"steps": steps, "currentvalue": {"prefix": "time ", "suffix": " s"}, "x": 0.12, "len": 0.88}],
-        "updatemenus": [
-            {"type": "buttons", "direction": "left", "buttons": buttons, "x": 0.0, "y": -0.12, "xanchor": "left",
-             "yanchor": "top", "showactive": False}
-        ],
-    }  # fmt: skip
+def _moving(track: Track, is_ghost: bool) -> Moving:
+    result = track.result
+    blown = (result["applied.thrust"], *(result[name].clip(0, 1) for name in ("port_thruster", "starboard_thruster")))
+    doubt = result["error.position"] if result.is_estimated and not result.is_lost else None
+    return Moving(track.name, result.run.craft, [result[name] for name in MOTION], blown, doubt, is_ghost)

@@ -11,6 +11,8 @@ from ..drawing.figures import check_plot, new_figure, save
 from ..drawing.palette import QUIET, SEA, SWAY
 from ..drawing.run_picture import draw_controls, draw_track, draw_wind
 from ..simulation import Result
+from ..whole import write_whole
+from .film import BLOWN, MOTION, Moving, film
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,6 +63,18 @@ def plot_passage(passage: Passage, path: str | os.PathLike[str]) -> Path:
                   borderaxespad=0.2)  # fmt: skip
     course.grid(alpha=0.3)
     return save(figure, path)
+
+
+def animate_passage(passage: Passage, path: str | os.PathLike[str]) -> Path:
+    """Write the craft on its voyage, with the waypoints, as a page that needs no network. Raises OSError: it cannot be
+    written.
+    """
+    path, voyage = Path(path), passage.voyage
+    motion, blown = ([passage[name] for name in names] for names in (MOTION, BLOWN))
+    craft = Moving("hovercraft", passage.craft, motion, blown)
+    title = f"{voyage.name}: {voyage.description}"
+    write_whole(path, film(title, passage["time"], [craft], marks=passage.waypoints))
+    return path
 
 
 def _draw_course(axes: "Axes", passage: Passage) -> None:

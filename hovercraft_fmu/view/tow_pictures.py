@@ -13,7 +13,9 @@ from ..drawing.palette import CRAFT, INK, QUIET, SEA, SWAY
 from ..drawing.shapes import placed
 from ..fmu.icon import outline
 from ..towing import Towed
-from ..whole import written
+from ..whole import write_whole, written
+from .animation import check_animation
+from .film import MOTION, Moving, Towline, film
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,16 +93,16 @@ def _draw_craft(axes: "Axes", towed: Towed, i: int) -> None:
 
 
 def animate_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
-    """Write both craft on their way, and the line, as a GIF.
+    """Write both craft on their way, and the line, as a GIF or as a page that needs no network.
 
     Raises:
-        ValueError: the name does not end in .gif.
-        ModuleNotFoundError: matplotlib is not installed; says how to install it.
+        ValueError, ModuleNotFoundError: see `check_animation`.
         OSError: the file cannot be written.
     """
-    path = Path(path)
-    if path.suffix != ".gif":
-        raise ValueError(f"animation = {str(path)!r}: must end in .gif (a moving picture)")
+    path = check_animation(path)
+    if path.suffix == ".html":
+        write_whole(path, _film(towed))
+        return path
     time = towed["time"]
     chosen = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], FRAMES) - 1e-6).clip(0, len(time) - 1))
     room = 1.2 * towed.tow.craft.length
@@ -115,6 +117,16 @@ def animate_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
     with written(path) as unfinished:
         still.save(unfinished, "GIF", save_all=True, append_images=moving, duration=times, loop=0, optimize=True)
     return path
+
+
+def _film(towed: Towed) -> bytes:
+    time, tow = towed["time"], towed.tow
+    helm = np.array(tow.helm)
+    now = helm[np.searchsorted(helm[:, 0], time, "right") - 1]
+    first, second = ([towed[f"{craft}.{name}"] for name in MOTION] for craft in COLORS)
+    crafts = (Moving("first", tow.craft, first, list(now.T[1:])), Moving("second", tow.craft, second))
+    ends = Towline(np.reshape(tow.line[3:], (2, 2)).tolist(), towed["tension"])
+    return film(f"A tow on ice: {time[-1]:g} s", time, crafts, towline=ends)
 
 
 def _frame(towed: Towed, i: int, corners: tuple[tuple[float, float], tuple[float, float]]) -> Image.Image:

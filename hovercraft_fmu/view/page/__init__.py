@@ -42,21 +42,29 @@ def page(flavour: Flavour = NATIVE3) -> bytes:
         NotCompiledError: there is no machine code of the C that is here.
     """
     own = NATIVE3.variant(flavour.identifier, flavour.own_starts) if flavour.variant_of else NATIVE3
-    html = (FOLDER / "index.html").read_text(encoding="utf-8")
+    return assembled("index.html", "main", _data(own))
+
+
+def assembled(name: str, main: str, data: Mapping[str, Any]) -> bytes:
+    """A page of this folder as one file: with its style, its main module and those that it needs, and data.
+
+    Raises ValueError: there is a number among the data that is not finite.
+    """
+    html = (FOLDER / name).read_text(encoding="utf-8")
     style = (FOLDER / "page.css").read_text(encoding="utf-8")
-    data = json.dumps(_data(own), separators=(",", ":")).replace("<", "\\u003c")
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     for place, content in (
         ('<link rel="stylesheet" href="page.css">', f"<style>\n{style}</style>"),
-        ('<script type="module" src="main.js"></script>', f'<script type="module">\n{script()}</script>'),
-        ('id="data"></script>', f'id="data">{data}</script>'),
+        (f'<script type="module" src="{main}.js"></script>', f'<script type="module">\n{_script(main)}</script>'),
+        ('id="data"></script>', f'id="data">{text}</script>'),
     ):
         before, after = html.split(place)
         html = before + content + after
     return html.encode()
 
 
-def script() -> str:
-    """The modules as one: each behind those that it imports."""
+def _script(main: str) -> str:
+    """Modules as one: each behind those that it imports."""
     texts: dict[str, str] = {}
 
     def take(name: str) -> None:
@@ -66,7 +74,7 @@ def script() -> str:
                 take(needed)
         texts[name] = re.sub(r"^export ", "", IMPORT.sub("", text), flags=re.MULTILINE)
 
-    take("main")
+    take(main)
     return "\n".join(texts.values())
 
 

@@ -1,6 +1,6 @@
 // The strip chart: two distances over time, on a logarithmic scale, the latest at the right.
 
-const SAMPLES = 300;
+export const SAMPLES = 300;
 const LOWEST = -9; // 10^n m
 const HIGHEST = 3;
 
@@ -23,7 +23,8 @@ export class Chart {
     if (this.samples.length > SAMPLES) this.samples.shift();
   }
 
-  draw() {
+  /** @param {number} now where the samples are of a whole run: the share of it that has passed */
+  draw(now = NaN) {
     const ratio = Math.min(window.devicePixelRatio || 1, 2),
       { context: c, element } = this;
     const width = element.clientWidth,
@@ -54,12 +55,16 @@ export class Chart {
       c.setLineDash(k ? [5, 3] : []);
       c.beginPath();
       this.samples.forEach((sample, i) => {
+        if (Number.isNaN(sample[k])) return;
         const power = Math.min(Math.max(Math.log10(sample[k] || 1e-99), LOWEST), HIGHEST);
         c.lineTo(46 + ((width - 46) * (SAMPLES - this.samples.length + i)) / (SAMPLES - 1), level(power));
       });
       c.stroke();
     });
     c.setLineDash([]);
+    if (Number.isNaN(now)) return;
+    c.fillStyle = color("--ink");
+    c.fillRect(45 + (width - 46) * now, 0, 2, height);
   }
 }
 

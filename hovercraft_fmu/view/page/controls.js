@@ -1,5 +1,6 @@
 // Keys, touch, and the fields of the panel: what a person does becomes calls of the actions.
 
+import { element, field, write } from "./elements.js";
 import { HELM, SCALES, STEP_SIZES, TOLERANCES, sceneOf } from "./settings.js";
 
 /** @typedef {import("./settings.js").Settings} Settings */
@@ -26,22 +27,6 @@ const HELD = {
   KeyD: "right",
 };
 const MOVED_BY_KEYS = "input, select, textarea";
-
-/** An element of the page. @param {string} id */
-export function element(id) {
-  return /** @type {HTMLElement} */ (document.getElementById(id));
-}
-
-/** A field of it. @param {string} id */
-export function field(id) {
-  return /** @type {HTMLInputElement} */ (document.getElementById(id));
-}
-
-/** Write, where it is not there already. @param {string} id @param {string} text */
-export function write(id, text) {
-  const at = element(id);
-  if (at.textContent !== text) at.textContent = text;
-}
 
 export class Controls {
   /**

@@ -70,31 +70,24 @@ export class Picture {
 
   /** @param {Shown} shown */
   draw(shown) {
-    const camera = new Camera(this.view, shown);
-    this.drawSea(camera);
+    const camera = this.camera(shown);
+    drawSea(camera, GRID);
     this.drawTrack(camera, this.ghostTrack, "ghost");
     if (!shown.still) this.drawWake(camera, shown);
     else this.drawTrack(camera, this.track, "wake");
     this.drawGates(camera, shown);
-    this.drawGhost(camera, shown);
-    this.drawCraft(camera, shown);
+    drawOutline(camera, shown.ghost, shown.size);
+    drawCraft(camera, shown.craft, shown.size, shown.inputs);
     this.drawMap(shown, camera);
     this.drawCompass(shown);
   }
 
-  /** @param {Camera} camera */
-  drawSea(camera) {
-    const { context: c, width, height, colors } = this.view;
-    c.fillStyle = colors.ground;
-    c.fillRect(0, 0, width, height);
-    c.strokeStyle = colors.grid;
-    c.lineWidth = 1;
-    c.beginPath();
-    const [x, y] = camera.place({ x: 0, y: 0 }),
-      spacing = GRID * camera.scale;
-    for (let at = ((x % spacing) + spacing) % spacing; at < width; at += spacing) line(c, [at, 0], [at, height]);
-    for (let at = ((y % spacing) + spacing) % spacing; at < height; at += spacing) line(c, [0, at], [width, at]);
-    c.stroke();
+  /** It follows the craft, or stands still and wraps at its edges. @param {Shown} shown */
+  camera({ craft, wraps }) {
+    const { width, height } = this.view,
+      scale = Math.min(Math.max(width / 260, 2.2), 6);
+    const fixed = { x: (0.5 - START[0]) * (width / scale), y: (0.5 - START[1]) * (height / scale) };
+    return new Camera(this.view, wraps ? fixed : craft, scale, wraps);
   }
 
   /** A band that widens and fades. @param {Camera} camera @param {Shown} shown */
@@ -128,30 +121,6 @@ export class Picture {
     for (let i = 1; i < track.points.length; i++) camera.line(track.points[i - 1], track.points[i]);
     c.stroke();
     c.globalAlpha = 1;
-  }
-
-  /** @param {Camera} camera @param {Shown} shown */
-  drawCraft(camera, shown) {
-    const { context: c, colors } = this.view;
-    for (const [color, jet] of jets(shown)) {
-      c.fillStyle = colors[color];
-      camera.fill(turned(jet, shown.craft.heading), shown.craft);
-    }
-    c.fillStyle = colors.hull;
-    c.strokeStyle = colors.edge;
-    c.lineWidth = 2;
-    camera.fill(turned(outline(shown.size), shown.craft.heading), shown.craft, true);
-  }
-
-  /** @param {Camera} camera @param {Shown} shown */
-  drawGhost(camera, shown) {
-    const { context: c, colors } = this.view;
-    c.strokeStyle = colors.ghost;
-    c.fillStyle = "transparent";
-    c.lineWidth = 2;
-    c.setLineDash([6, 4]);
-    camera.fill(turned(outline(shown.size), shown.ghost.heading), shown.ghost, true);
-    c.setLineDash([]);
   }
 
   /**
@@ -292,7 +261,7 @@ export class Picture {
 }
 
 /** A canvas, sharp on any screen, with the colours of the page. */
-class Canvas {
+export class Canvas {
   /** @param {HTMLCanvasElement} element */
   constructor(element) {
     this.element = element;
@@ -316,15 +285,19 @@ class Canvas {
   }
 }
 
-/** Where metres lie on the view. It follows the craft, or stands still and wraps at its edges. */
+/** Where metres lie on a view, which may wrap at its edges. */
 export class Camera {
-  /** @param {Canvas} canvas @param {Shown} shown */
-  constructor(canvas, shown) {
+  /**
+   * @param {Canvas} canvas
+   * @param {{ x: number, y: number }} at what is in the middle, m
+   * @param {number} scale pixels a metre
+   */
+  constructor(canvas, at, scale, wraps = false) {
     this.canvas = canvas;
-    this.wraps = shown.wraps;
-    this.scale = Math.min(Math.max(canvas.width / 260, 2.2), 6);
-    this.x = this.wraps ? (0.5 - START[0]) * (canvas.width / this.scale) : shown.craft.x;
-    this.y = this.wraps ? (0.5 - START[1]) * (canvas.height / this.scale) : shown.craft.y;
+    this.x = at.x;
+    this.y = at.y;
+    this.scale = scale;
+    this.wraps = wraps;
   }
 
   /** @param {{ x: number, y: number }} point @returns {Point} */
@@ -375,6 +348,50 @@ export class Camera {
   }
 }
 
+/** The ground, with lines a spacing apart. @param {Camera} camera @param {number} spacing m */
+export function drawSea(camera, spacing) {
+  const { context: c, width, height, colors } = camera.canvas;
+  c.fillStyle = colors.ground;
+  c.fillRect(0, 0, width, height);
+  c.strokeStyle = colors.grid;
+  c.lineWidth = 1;
+  c.beginPath();
+  const [x, y] = camera.place({ x: 0, y: 0 }),
+    size = spacing * camera.scale;
+  for (let at = ((x % size) + size) % size; at < width; at += size) line(c, [at, 0], [at, height]);
+  for (let at = ((y % size) + size) % size; at < height; at += size) line(c, [0, at], [width, at]);
+  c.stroke();
+}
+
+/**
+ * @param {Camera} camera
+ * @param {Pose} pose
+ * @param {Shown["size"]} size
+ * @param {Shown["inputs"]} inputs
+ */
+export function drawCraft(camera, pose, size, inputs, edge = camera.canvas.colors.edge) {
+  const { context: c, colors } = camera.canvas;
+  for (const [color, jet] of jets(size, inputs)) {
+    c.fillStyle = colors[color];
+    camera.fill(turned(jet, pose.heading), pose);
+  }
+  c.fillStyle = colors.hull;
+  c.strokeStyle = edge;
+  c.lineWidth = 2;
+  camera.fill(turned(outline(size), pose.heading), pose, true);
+}
+
+/** Of a ghost, dashed. @param {Camera} camera @param {Pose} pose @param {Shown["size"]} size */
+export function drawOutline(camera, pose, size) {
+  const { context: c, colors } = camera.canvas;
+  c.strokeStyle = colors.ghost;
+  c.fillStyle = "transparent";
+  c.lineWidth = 2;
+  c.setLineDash([6, 4]);
+  camera.fill(turned(outline(size), pose.heading), pose, true);
+  c.setLineDash([]);
+}
+
 /** The craft, around the centre of gravity, bow ahead. @param {Shown["size"]} size */
 function outline({ length, width }) {
   const [ahead, side] = [length / 2, width / 2];
@@ -389,10 +406,11 @@ function outline({ length, width }) {
 
 /**
  * What is blown out: the stronger the push, the longer; reverse thrust blows forward.
- * @param {Shown} shown
+ * @param {Shown["size"]} size
+ * @param {Shown["inputs"]} inputs
  * @returns {[string, number[][]][]}
  */
-function jets({ size, inputs }) {
+function jets(size, inputs) {
   const [stern, bow, side] = [-size.length / 2, size.length / 2, size.width / 2];
   const root = 0.06 * size.length,
     wide = side / 2,
@@ -427,7 +445,7 @@ function jets({ size, inputs }) {
 }
 
 /** Points of the body, as they lie at a heading. @param {number[][]} points @param {number} heading */
-function turned(points, heading) {
+export function turned(points, heading) {
   const c = Math.cos(heading),
     s = Math.sin(heading);
   return points.map(([ahead, across]) => [c * ahead - s * across, s * ahead + c * across]);
@@ -445,13 +463,13 @@ function posts(gate) {
 }
 
 /** @param {CanvasRenderingContext2D} c @param {Point} a @param {Point} b */
-function line(c, a, b) {
+export function line(c, a, b) {
   c.moveTo(...a);
   c.lineTo(...b);
 }
 
 /** @param {CanvasRenderingContext2D} c @param {Point} at @param {number} radius @param {string} color */
-function dot(c, at, radius, color) {
+export function dot(c, at, radius, color) {
   c.fillStyle = color;
   c.beginPath();
   c.arc(...at, radius, 0, 2 * Math.PI);

@@ -1,9 +1,10 @@
 // The page: it unpacks the FMU, and goes from frame to frame.
 
 import { Chart } from "./chart.js";
-import { Controls, element, field, write } from "./controls.js";
+import { Controls } from "./controls.js";
 import { Course } from "./course.js";
 import { Picture } from "./drawing.js";
+import { element, field, write } from "./elements.js";
 import { Flight, Helm, Pace, Reel, SHORTEST, STATES } from "./flight.js";
 import { Description, Instance, Library, Refusal } from "./fmu.js";
 import { measurePrices } from "./prices.js";
