@@ -4,13 +4,16 @@ import math
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
 from hypothesis import given
+from lxml import etree
 
+from hovercraft_fmu.building.ssp import build_tow_ssp
 from hovercraft_fmu.coupling import GAUSS_SEIDEL, JACOBI
 from hovercraft_fmu.elsewhere import HOSTS, rows_of_module
 from hovercraft_fmu.fmu.machine_code import OPTIONS, headers
@@ -25,11 +28,13 @@ from hovercraft_fmu.tether.line import Line, pull
 from hovercraft_fmu.tether.tether_native import TETHER_NATIVE, TETHER_NATIVE3
 from hovercraft_fmu.tether.tether_package import build_tether
 from hovercraft_fmu.towing import BEND, COLUMNS, Tow, haul, haul_bare
+from hovercraft_fmu.validation import validate_ssp
 from tests.conftest import Built
 from tests.native import c_compiler
 from tests.strategies import states
-from tests.tow_masters import MASTERS, SHOWN, STRAIGHT
+from tests.tow_masters import CONNECTIONS, MASTERS, SHOWN, STARTS, STRAIGHT
 
+LOOSE_ENDS = "members, connectors, connections"
 BOTH = pytest.mark.parametrize("scheme", [JACOBI, GAUSS_SEIDEL])
 
 
@@ -202,16 +207,49 @@ def test_how_long_a_step_may_be_and_what_held_forces_add() -> None:
 
 
 @pytest.mark.parametrize("master", MASTERS)
-def test_another_master_gives_the_bits_of_ours(master: str, native_fmu: Path, each_native_tether: Path) -> None:
+def test_another_master_gives_the_bits_of_ours(master: str, each_native_fmu: Path, each_native_tether: Path) -> None:
     """A straight tow by two craft and a tether, all three machine code, side by side."""
-    if missing := HOSTS[master].missing():
+    library = master.split(",")[0]
+    if missing := HOSTS[library].missing():
         pytest.skip(missing)
-    if read_description(each_native_tether).fmiVersion != "2.0" and master != "ecospy":
-        pytest.skip("libcosimpy 0.0.6 dies on an FMU of FMI 3.0; fmucontainer wants all of one standard")
-    if master == "ecospy" and not Path(sys.prefix, "lib", "libtbb.so.12").exists():
+    if read_description(each_native_tether).fmiVersion != "2.0" and library == "libcosimpy":
+        pytest.skip("libcosimpy 0.0.6 dies on an FMU of FMI 3.0")
+    if library == "ecospy" and not Path(sys.prefix, "lib", "libtbb.so.12").exists():
         pytest.skip("the package tbb is not in this environment's own folder")
-    found = rows_of_module("tests.tow_masters", master, str(native_fmu), str(each_native_tether))
-    ours = haul(STRAIGHT, native_fmu, each_native_tether)
+    found = rows_of_module("tests.tow_masters", master, str(each_native_fmu), str(each_native_tether))
+    ours = haul(STRAIGHT, each_native_fmu, each_native_tether)
     names = [name if part == "tether" else f"{part}.{name}" for part, name in SHOWN]
     assert found == np.array([ours[name] for name in names]).T[1:].tolist()
     assert max(row[-1] for row in found) > 5.0
+
+
+def test_the_ssp_of_the_tow_is_valid_whole_and_the_same_every_time(
+    each_native_fmu: Path, each_native_tether: Path, tmp_path: Path
+) -> None:
+    """By the schemas, and what it names is there; it gives the tow that is run above."""
+    path, again = (
+        build_tow_ssp(tmp_path / folder / "Tow.ssp", each_native_fmu, each_native_tether) for folder in ("a", "b")
+    )
+    assert path.read_bytes() == again.read_bytes()
+    checks = [check for check in validate_ssp(path) if check.what in ("XML schemas of SSP", LOOSE_ENDS)]
+    assert [check.problems for check in checks] == [[], []]
+    with zipfile.ZipFile(path) as archive:
+        assert len([name for name in archive.namelist() if name.endswith(".fmu")]) == 2
+        sets = {part: etree.fromstring(archive.read(f"resources/{part}.ssv")) for part in STARTS}
+        structure = etree.fromstring(archive.read("SystemStructure.ssd"))
+        page = archive.read("documentation/tow.html").decode()
+    for part, expected in STARTS.items():
+        values = {node.get("name"): float(node[0].get("value")) for node in sets[part].iter("{*}Parameter")}
+        assert expected.items() <= values.items()
+        assert sets[part].get("name") == "tow"
+    ends = ("startElement", "startConnector", "endElement", "endConnector")
+    assert [tuple(node.get(end) for end in ends) for node in structure.iter("{*}Connection")] == [*CONNECTIONS]
+    connectors = {
+        (part.get("name"), each.get("name")): each[0].get("unit")
+        for part in structure.iter("{*}Component")
+        for each in part.iter("{*}Connector")
+    }
+    for start, output, end, taken in CONNECTIONS:
+        assert connectors[start, output] == connectors[end, taken] is not None
+    assert ("first", "thrust") not in connectors  # fmpy.ssp would hold it at 0
+    assert "connector for <code>thrust</code>:" in page

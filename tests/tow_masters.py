@@ -1,6 +1,6 @@
 """python -m tests.tow_masters MASTER CRAFT TETHER: a straight tow in a master that others wrote, as rows of JSON.
 
-The craft start at the origin, as not every master sets outputs: the line is made fast where the first one would be.
+It is that of the SSP file: the craft start at the origin, and the first one leaves until the line is taut.
 """
 
 import json
@@ -9,7 +9,9 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeAlias
 
+from hovercraft_fmu.building.ssp import TOW, build_tow_ssp
 from hovercraft_fmu.elsewhere import HostError, load_tbb, make_container
 from hovercraft_fmu.fmu.interface import EXTERNAL, HOVERCRAFT, STATES
 from hovercraft_fmu.fmu.variable import Model
@@ -19,8 +21,8 @@ from hovercraft_fmu.tether.line import Line
 from hovercraft_fmu.tether.tether_interface import CRAFT, PARAMETERS, TETHER_MODEL
 from hovercraft_fmu.towing import Tow
 
-STEP, STEPS = 0.1, 200
-LINE = Line(first_x=40.0)
+STEP, STEPS = 0.1, 400
+LINE = Line()
 STRAIGHT = Tow(State(), State(), preset("ice"), LINE, communication_step=STEP, stop_time=STEPS * STEP)
 SHOWN = (*((craft, name) for craft in CRAFT for name in STATES), ("tether", "tension"))
 STARTS = {
@@ -32,6 +34,9 @@ CONNECTIONS = (
     *((craft, name, "tether", f"{craft}.{name}") for craft in CRAFT for name in STATES),
     *(("tether", f"{craft}.{name}", craft, name) for craft in CRAFT for name in EXTERNAL),
 )
+
+
+Rows: TypeAlias = list[list[float]]
 
 
 def _model(part: str) -> Model:
@@ -46,14 +51,11 @@ def _files(craft: Path, tether: Path) -> dict[str, Path]:
     return {"first": craft, "second": craft, "tether": tether}
 
 
-def libcosimpy(craft: Path, tether: Path) -> list[list[float]]:
+def libcosimpy(craft: Path, tether: Path) -> Rows:
     """Side by side (Jacobi)."""
     from libcosimpy.CosimExecution import CosimExecution
-    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
-    from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
 
-    log_output_level(CosimLogLevel.ERROR)
     execution = CosimExecution.from_step_size(round(STEP * 1e9))  # ns
     index = {
         part: execution.add_local_slave(CosimLocalSlave(fmu_path=str(path), instance_name=part))
@@ -67,9 +69,26 @@ def libcosimpy(craft: Path, tether: Path) -> list[list[float]]:
         ends = index[start], _reference(start, output), index[end], _reference(end, taken)
         if execution.connect_real_variables(*ends) != 0:
             raise HostError(f"libcosimpy: {start}.{output} does not connect to {end}.{taken}")
+    return _libcosimpy(execution)
+
+
+def libcosimpy_ssp(craft: Path, tether: Path) -> Rows:
+    """From the SSP file, whose annotation has the step size."""
+    from libcosimpy.CosimExecution import CosimExecution
+
+    with tempfile.TemporaryDirectory() as place:
+        return _libcosimpy(CosimExecution.from_ssp_file(str(_ssp(place, craft, tether))))
+
+
+def _libcosimpy(execution: Any) -> Rows:
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimObserver import CosimObserver
+
+    log_output_level(CosimLogLevel.ERROR)
     observer = CosimObserver.create_last_value()
     if not execution.add_observer(observer):
         raise HostError("libcosimpy: no observer")
+    index = {part: execution.slave_index_from_instance_name(part) for part in STARTS}
     rows = []
     for _ in range(STEPS):
         execution.step()
@@ -77,7 +96,7 @@ def libcosimpy(craft: Path, tether: Path) -> list[list[float]]:
     return rows
 
 
-def ecospy(craft: Path, tether: Path) -> list[list[float]]:
+def ecospy(craft: Path, tether: Path) -> Rows:
     """Side by side (Jacobi)."""
     load_tbb()
     from ecospy import EcosSimulation, EcosSimulationStructure
@@ -88,21 +107,35 @@ def ecospy(craft: Path, tether: Path) -> list[list[float]]:
     for start, output, end, taken in CONNECTIONS:
         structure.make_real_connection(f"{start}::{output}", f"{end}::{taken}")
     structure.add_parameter_set(
-        "start", {f"{part}::{name}": value for part, values in STARTS.items() for name, value in values.items()}
+        TOW, {f"{part}::{name}": value for part, values in STARTS.items() for name, value in values.items()}
     )
-    rows = []
     with EcosSimulation(structure=structure, step_size=STEP) as simulation:
-        simulation.init(parameter_set="start")
-        for _ in range(STEPS):
-            simulation.step()
-            rows.append([simulation.get_real(f"{part}::{name}") for part, name in SHOWN])
+        return _ecospy(simulation)
+
+
+def ecospy_ssp(craft: Path, tether: Path) -> Rows:
+    """From the SSP file; its parameter sets have one name, by which all are taken."""
+    load_tbb()
+    from ecospy import EcosSimulation
+
+    with (
+        tempfile.TemporaryDirectory() as place,
+        EcosSimulation(ssp_path=str(_ssp(place, craft, tether)), step_size=STEP) as simulation,
+    ):
+        return _ecospy(simulation)
+
+
+def _ecospy(simulation: Any) -> Rows:
+    simulation.init(parameter_set=TOW)
+    rows = []
+    for _ in range(STEPS):
+        simulation.step()
+        rows.append([simulation.get_real(f"{part}::{name}") for part, name in SHOWN])
     return rows
 
 
-def fmucontainer(craft: Path, tether: Path) -> list[list[float]]:
+def fmucontainer(craft: Path, tether: Path) -> Rows:
     """Side by side (Jacobi): an FMU that has all three inside, run by fmpy."""
-    import fmpy
-
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         for part, path in _files(craft, tether).items():
@@ -115,16 +148,47 @@ def fmucontainer(craft: Path, tether: Path) -> list[list[float]]:
             "start": [[f"{part}.fmu", name, x] for part, values in STARTS.items() for name, x in values.items()],
         }  # fmt: skip
         make_container(folder, content)
-        result = fmpy.simulate_fmu(
-            str(folder / "Tow.fmu"), stop_time=STEPS * STEP, output_interval=STEP, step_size=STEP
-        )
+        return _container(folder / "Tow.fmu")
+
+
+def fmucontainer_ssp(craft: Path, tether: Path) -> Rows:
+    """From the SSP file. Its reader knows no parameter sets, and only outputs of the system: both are told it.
+
+    The second component of a file has a number behind its name.
+    """
+    from fmu_manipulation_toolbox.assembly import Assembly
+
+    with tempfile.TemporaryDirectory() as place:
+        _ssp(place, craft, tether)
+        assembly = Assembly("Tow.ssp", default_step_size=STEP, fmu_directory=Path(place))
+        names = dict(zip(STARTS, (craft.stem, f"{craft.stem}-1", tether.stem), strict=True))
+        for part, name in SHOWN:
+            assembly.root.add_output(f"Tow.dir/{names[part]}.fmu", name, f"shown.{part}.{name}")
+        for part, values in STARTS.items():
+            for name, value in values.items():
+                assembly.root.add_start_value(f"Tow.dir/{names[part]}.fmu", name, value)
+        assembly.make_fmu()
+        return _container(Path(place) / "Tow.fmu")
+
+
+def _container(path: Path) -> Rows:
+    import fmpy
+
+    result = fmpy.simulate_fmu(str(path), stop_time=STEPS * STEP, output_interval=STEP, step_size=STEP)
     return [[float(row[f"shown.{part}.{name}"]) for part, name in SHOWN] for row in result[1:]]
 
 
-MASTERS: dict[str, Callable[[Path, Path], list[list[float]]]] = {
+def _ssp(folder: str, craft: Path, tether: Path) -> Path:
+    return build_tow_ssp(Path(folder) / "Tow.ssp", craft, tether)
+
+
+MASTERS: dict[str, Callable[[Path, Path], Rows]] = {
     "libcosimpy": libcosimpy,
+    "libcosimpy, SSP": libcosimpy_ssp,
     "ecospy": ecospy,
+    "ecospy, SSP": ecospy_ssp,
     "fmucontainer": fmucontainer,
+    "fmucontainer, SSP": fmucontainer_ssp,
 }
 
 if __name__ == "__main__":

@@ -28,13 +28,14 @@ from ..tether.tether_package import build_native_tether, build_tether
 from ..view.page import FILE as PAGE
 from ..view.page import page
 from ..whole import temporary_folder
-from .ssp import build_ssp
+from .ssp import build_ssp, build_tow_ssp
 
 Kind: TypeAlias = Literal[
     "native", "native3", "python",
     "native_autopilot", "native3_autopilot", "autopilot",
     "native_tether", "native3_tether", "tether",
     "native_loop", "native3_loop", "python_loop",
+    "native_tow", "native3_tow",
 ]  # fmt: skip
 FOLDER = Path("build")
 
@@ -82,6 +83,19 @@ def _loop(flavour: Flavour) -> Product:
 
     purpose = f"SSP 1.0: the closed loop of {fmu} and {pilot}, for co-simulation masters"
     return Product(f"{flavour.identifier}Loop.ssp", purpose, write)
+
+
+def _tow(craft: Flavour, tether: Flavour) -> Product:
+    fmu, line = f"{craft.identifier}.fmu", f"{tether.identifier}.fmu"
+
+    def write(path: Path) -> Path:
+        check_target(path, ".ssp")
+        with temporary_folder() as folder:
+            files = _craft(craft)(Path(folder) / fmu), build_native_tether(Path(folder) / line, tether)
+            return build_tow_ssp(path, *files)
+
+    purpose = f"SSP 1.0: a tow of {fmu}, twice, and {line}, for co-simulation masters"
+    return Product(f"{craft.identifier}Tow.ssp", purpose, write)
 
 
 PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
@@ -143,6 +157,8 @@ PRODUCTS: Mapping[Kind, Product] = MappingProxyType(
         "native_loop": _loop(NATIVE),
         "native3_loop": _loop(NATIVE3),
         "python_loop": _loop(PYTHON),
+        "native_tow": _tow(NATIVE, TETHER_NATIVE),
+        "native3_tow": _tow(NATIVE3, TETHER_NATIVE3),
     }
 )
 assert tuple(PRODUCTS) == get_args(Kind)
@@ -167,8 +183,8 @@ def build(
         start_values: and others, by name; they come after the preset's.
 
     Raises:
-        ValueError: no such kind, or the path does not end in .fmu (.ssp for a loop); a name, preset or start value that
-            cannot be.
+        ValueError: no such kind, or the path does not end in .fmu (.ssp for a loop or a tow); a name, preset or start
+            value that cannot be.
         NotCompiledError: there is no machine code for a native one; the message says how to get it.
         OSError: the file cannot be written; one that stood there before still does.
     """

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 def build(
     kinds: tuple[str, ...], output: Path, name: str | None, preset: str | None, settings: tuple[str, ...], as_json: bool
 ) -> None:
-    """Write the FMUs and the SSP files of the closed loop.
+    """Write the FMUs, and the SSP files of the closed loop and of a tow.
 
-    KIND is native, native3, python, autopilot, tether, native_loop, native3_loop or python_loop; without it all are
-    written,
-    and with --name the native FMU alone.
+    KIND is native, native3 or python; native_autopilot, native3_autopilot or autopilot; native_tether, native3_tether
+    or tether; native_loop, native3_loop or python_loop; native_tow or native3_tow. Without it all are written, and
+    with --name the native FMU alone.
     """
     from ..building import PRODUCTS, product, variant_product
     from ..fmu.archive import check_target
