@@ -14,11 +14,17 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor
 from playwright.sync_api import Page, expect
 
+from hovercraft_fmu.coupling import sail_bare
 from hovercraft_fmu.drawing.palette import METHODS
 from hovercraft_fmu.model.craft import Craft
+from hovercraft_fmu.model.integrators import integrator
+from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.simulation import Result, plan, run_model
+from hovercraft_fmu.towing import BEND, haul_bare
 from hovercraft_fmu.view.animation import FRAMES, MovingPicture, Track, animate
-from hovercraft_fmu.view.film import Moving, Towline, film
+from hovercraft_fmu.view.film import BLOWN, Moving, Towline, film
+from hovercraft_fmu.view.plots import animate_passage
+from hovercraft_fmu.view.tow_pictures import animate_tow
 from tests.conftest import ROOT
 from tests.shell import Shell
 
@@ -218,6 +224,28 @@ def test_a_page_is_small_and_needs_no_network(two: list[Result], tmp_path: Path)
             assert np.abs(crafts[name] - there).max() <= 0.01
     assert [each["ghost"] for each in data["crafts"]] == [False, True]
     assert page == page_of(two, tmp_path)
+
+
+def test_a_tow_and_a_voyage_are_pages_too(played: Callable[..., Page], tmp_path: Path) -> None:
+    """With what is known of them: the helm of the first craft, the line, waypoints."""
+    coarse = Settings(0.1, integrator(3))
+    towed = haul_bare(BEND, communication_step=0.1, stop_time=70.0, settings=coarse)
+    page = animate_tow(towed, tmp_path / "tow.html").read_bytes()
+    data = data_of(page)
+    assert [each["x"][-1] for each in data["crafts"]] == pytest.approx(
+        [towed[f"{name}.pose.x"][-1] for name in ("first", "second")], abs=0.01
+    )
+    for time, *blown in BEND.helm[: sum(row[0] <= 60.0 for row in BEND.helm)]:
+        later = np.searchsorted(data["time"], time + 1.0)
+        assert [data["crafts"][0][name][later] for name in BLOWN] == pytest.approx(blown)
+    assert data["line"]["tension"][-1] == pytest.approx(towed["tension"][-1], abs=0.01)
+    played(page).keyboard.press("End")
+    passage = sail_bare("calm", communication_step=1.0, stop_time=100.0, settings=coarse)
+    page = animate_passage(passage, tmp_path / "loop.html").read_bytes()
+    data = data_of(page)
+    assert data["marks"] == [list(each) for each in passage.waypoints]
+    assert data["crafts"][0]["y"] == pytest.approx(passage["pose.y"], abs=0.01)
+    played(page, scheme="dark").keyboard.press("f")
 
 
 def test_what_else_differs_is_named(tmp_path: Path) -> None:

@@ -335,4 +335,5 @@ def test_the_demo_of_the_loop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert "waypoints reached  6 of 6" in done.output
     with Image.open("build/demo/loop.png") as picture:
         assert picture.size == (1440, 810)
+    assert Path("build/demo/loop.html").stat().st_size < 200_000
     assert Path("build/demo/loop.csv").read_text().startswith('"time","pose.x"')

@@ -122,7 +122,7 @@ def animate_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
 def _film(towed: Towed) -> bytes:
     time, tow = towed["time"], towed.tow
     helm = np.array(tow.helm)
-    now = helm[np.searchsorted(helm[:, 0], time, "right") - 1]
+    now = helm[np.searchsorted(helm[:, 0], time * (1.0 + 1e-12), "right") - 1]
     first, second = ([towed[f"{craft}.{name}"] for name in MOTION] for craft in COLORS)
     crafts = (Moving("first", tow.craft, first, list(now.T[1:])), Moving("second", tow.craft, second))
     ends = Towline(np.reshape(tow.line[3:], (2, 2)).tolist(), towed["tension"])
