@@ -17,7 +17,7 @@ from hovercraft_fmu.autopilot.pilot_native import AUTOPILOT_NATIVE, AUTOPILOT_NA
 from hovercraft_fmu.autopilot.pilot_package import build_autopilot, build_native_autopilot
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.interface import HOVERCRAFT
-from hovercraft_fmu.fmu.machine_code import BROWSER, TARGETS, NotCompiledError
+from hovercraft_fmu.fmu.machine_code import BROWSER, PLATFORMS, TARGETS, NotCompiledError
 from hovercraft_fmu.fmu.native_package import build_native_fmu
 from hovercraft_fmu.fmu.python_package import build_fmu
 from hovercraft_fmu.libraries import compile_libraries
@@ -151,10 +151,20 @@ def native3_fmu(built: Built) -> Path:
 
 
 @pytest.fixture(scope="session")
-def complete_native_fmu(standard: int, built: Built) -> Path:
+def complete(built: Built) -> Callable[[Flavour], Path]:
+    """A native FMU of any model, for every platform."""
+
+    def made(flavour: Flavour) -> Path:
+        targets = TARGETS if flavour.model is HOVERCRAFT else PLATFORMS
+        return _compiled(flavour, f"{flavour.identifier}Complete.fmu", built, targets)
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def complete_native_fmu(standard: int, complete: Callable[[Flavour], Path]) -> Path:
     """The native FMU of FMI 2.0, then that of FMI 3.0, for every platform."""
-    flavour = NATIVE if standard == 2 else NATIVE3
-    return _compiled(flavour, f"{flavour.identifier}Complete.fmu", built, TARGETS)
+    return complete(NATIVE if standard == 2 else NATIVE3)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,6 @@
-/* 8 threads with 1000 instances each, all alive at once in a thread, each with its own controls: every one must end
-   where the same controls end in a lone instance. One in five is in model exchange, with a step of Euler's. */
+/* 8 threads with INSTANCES each, all alive at once in a thread, each with its own inputs: every one must end with
+   the values that the same inputs give in a lone instance. Where the model has states, one in five is in model exchange,
+   with a step of Euler's. */
 
 #include <pthread.h>
 #include <stdio.h>
@@ -9,9 +10,9 @@
 #include "calls.h"
 #include "variables.h"
 
-enum { THREADS = 8, INSTANCES = 1000, KINDS = 50, STEPS = 3, RESULTS = 6 };
+enum { THREADS = 8, KINDS = 50, STEPS = 3, MOST_STATES = 8 };
 
-static double expected[KINDS][RESULTS];
+static double expected[KINDS][VARIABLE_COUNT];
 
 static void demand(int good, const char *what)
 {
@@ -23,65 +24,72 @@ static void demand(int good, const char *what)
 
 static int exchanges(int kind)
 {
-    return kind % 5 == 4;
+    return STATE_COUNT > 0 && kind % 5 == 4;
 }
 
 static void *made(int kind)
 {
-    static const unsigned inputs[] = {V_THRUST, V_PORT_THRUSTER, V_STARBOARD_THRUSTER};
-    const double controls[] = {kind % 11, kind % 7 / 7.0, kind % 5 / 5.0};
-    void *craft = call_instantiate(exchanges(kind) ? CALL_EXCHANGE : CALL_STEPS, VARIANT.guid, "");
-    demand(craft != NULL, "instantiate");
-    demand(call_choose(craft, V_INTEGRATOR, kind % 4 + 1) == CALL_OK, "choose");
-    demand(call_start(craft) == CALL_OK, "initialization");
-    demand(call_set(craft, inputs, 3, controls) == CALL_OK, "set");
-    demand(!exchanges(kind) || call_go_continuous(craft) == CALL_OK, "continuous-time mode");
-    return craft;
+    double inputs[INPUT_COUNT];
+    void *instance = call_instantiate(exchanges(kind) ? CALL_EXCHANGE : CALL_STEPS, VARIANT.guid, "");
+    for (int i = 0; i < INPUT_COUNT; i++)
+        inputs[i] = kind % (INPUT_COUNT + 1 - i) / 12.0; /* within all limits */
+    demand(instance != NULL, "instantiate");
+#ifdef INTEGRATOR_COUNT
+    demand(call_choose(instance, V_INTEGRATOR, kind % 4 + 1) == CALL_OK, "choose");
+#endif
+    demand(call_start(instance) == CALL_OK, "initialization");
+    demand(call_set(instance, INPUTS, INPUT_COUNT, inputs) == CALL_OK, "set");
+    demand(!exchanges(kind) || call_go_continuous(instance) == CALL_OK, "continuous-time mode");
+    return instance;
 }
 
-static void finish(void *craft, double results[RESULTS])
+/* Every Real. */
+static void finish(void *instance, double results[VARIABLE_COUNT])
 {
-    static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,     V_POSE_HEADING,
-                                       V_VELOCITY_X, V_VELOCITY_Y, V_VELOCITY_YAW_RATE};
-    demand(call_get(craft, outputs, RESULTS, results) == CALL_OK, "get");
-    call_free(craft);
+    unsigned references[VARIABLE_COUNT];
+    size_t n = 0;
+    for (unsigned i = 0; i < VARIABLE_COUNT; i++)
+        if (VARIABLES[i].kind == REAL)
+            references[n++] = i;
+    demand(call_get(instance, references, n, results) == CALL_OK, "get");
+    call_free(instance);
 }
 
-static void exchange(void *craft, int k)
+static void exchange(void *instance, int k)
 {
-    double states[RESULTS], rates[RESULTS];
-    demand(call_set_time(craft, k * 0.05) == CALL_OK && call_get_states(craft, states, RESULTS) == CALL_OK &&
-               call_get_rates(craft, rates, RESULTS) == CALL_OK,
+    double states[MOST_STATES], rates[MOST_STATES];
+    demand(call_set_time(instance, k * 0.05) == CALL_OK && call_get_states(instance, states, STATE_COUNT) == CALL_OK &&
+               call_get_rates(instance, rates, STATE_COUNT) == CALL_OK,
            "derivatives");
-    for (int i = 0; i < RESULTS; i++)
+    for (int i = 0; i < STATE_COUNT; i++)
         states[i] += 0.05 * rates[i];
-    demand(call_set_states(craft, states, RESULTS) == CALL_OK, "states");
+    demand(call_set_states(instance, states, STATE_COUNT) == CALL_OK, "states");
 }
 
-static void step(void *craft, int kind, int k)
+static void step(void *instance, int kind, int k)
 {
     if (exchanges(kind))
-        exchange(craft, k);
+        exchange(instance, k);
     else
-        demand(call_step(craft, k * 0.05, 0.05) == CALL_OK, "step");
+        demand(call_step(instance, k * 0.05, 0.05) == CALL_OK, "step");
 }
 
 static void *drive(void *unused)
 {
     static const size_t size = sizeof expected[0];
-    void **craft = calloc(INSTANCES, sizeof *craft);
-    double results[RESULTS];
+    void **instance = calloc(INSTANCES, sizeof *instance);
+    double results[VARIABLE_COUNT] = {0.0};
     (void)unused;
     for (int i = 0; i < INSTANCES; i++)
-        craft[i] = made(i % KINDS);
+        instance[i] = made(i % KINDS);
     for (int k = 0; k < STEPS; k++)
         for (int i = 0; i < INSTANCES; i++)
-            step(craft[i], i % KINDS, k);
+            step(instance[i], i % KINDS, k);
     for (int i = 0; i < INSTANCES; i++) {
-        finish(craft[i], results);
+        finish(instance[i], results);
         demand(memcmp(results, expected[i % KINDS], size) == 0, "an instance ended elsewhere");
     }
-    free(craft);
+    free(instance);
     return NULL;
 }
 
@@ -89,10 +97,10 @@ int main(void)
 {
     pthread_t threads[THREADS];
     for (int kind = 0; kind < KINDS; kind++) {
-        void *craft = made(kind);
+        void *instance = made(kind);
         for (int k = 0; k < STEPS; k++)
-            step(craft, kind, k);
-        finish(craft, expected[kind]);
+            step(instance, kind, k);
+        finish(instance, expected[kind]);
     }
     for (int i = 0; i < THREADS; i++)
         demand(pthread_create(&threads[i], NULL, drive, NULL) == 0, "pthread_create");

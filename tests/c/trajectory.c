@@ -1,5 +1,5 @@
-/* Every bit of every run, on any platform: each scene with each method, all outputs at all communication points, as
-   they lie in memory. The runs are in runs.h, made from the scenes; LIBRARY is the FMU's, beside the host.
+/* Every bit of every run of any model, on any platform: what is SEEN at all communication points, as it lies in memory.
+   The runs are in runs.h; LIBRARY is the FMU's, beside the host.
 
    With -DBARE, and on Windows, without a C runtime: zig would build one for a minute. */
 
@@ -73,23 +73,20 @@ static void leave(int status)
 /* Whether every call of a run was taken. */
 static bool ran(const struct run *run)
 {
-    static const unsigned outputs[] = {V_POSE_X,     V_POSE_Y,     V_POSE_HEADING,      V_VELOCITY_X, V_VELOCITY_Y,
-                                       V_VELOCITY_YAW_RATE,        V_BODY_SURGE,        V_BODY_SWAY,  V_SPEED,
-                                       V_FORCE_X,    V_FORCE_Y,    V_MOMENT,            V_STABILITY_NUMBER};
-    enum { OUTPUTS = sizeof outputs / sizeof *outputs };
-    double values[OUTPUTS];
-    void *craft = call_instantiate(CALL_STEPS, VARIANT.guid, "");
-    if (!craft || call_set(craft, run->references, run->starts, run->values) != CALL_OK ||
-        call_choose(craft, V_INTEGRATOR, run->method) != CALL_OK || call_start(craft) != CALL_OK)
+    enum { SEEN_COUNT = sizeof SEEN / sizeof *SEEN };
+    double values[SEEN_COUNT];
+    void *made = call_instantiate(CALL_STEPS, VARIANT.guid, "");
+    if (!made || call_set(made, run->references, run->starts, run->values) != CALL_OK ||
+        (run->choice && call_choose(made, run->choice, run->item) != CALL_OK) || call_start(made) != CALL_OK)
         return false;
     for (unsigned i = 0; i < run->steps; i++) {
-        const double *row = run->rows[i]; /* time, step, controls */
-        if (call_set(craft, INPUTS, INPUT_COUNT, row + 2) != CALL_OK ||
-            call_step(craft, row[0], row[1]) > CALL_WARNED || call_get(craft, outputs, OUTPUTS, values) != CALL_OK)
+        const double *row = run->rows[i]; /* time, step, inputs */
+        if (call_set(made, INPUTS, INPUT_COUNT, row + 2) != CALL_OK ||
+            call_step(made, row[0], row[1]) > CALL_WARNED || call_get(made, SEEN, SEEN_COUNT, values) != CALL_OK)
             return false;
         print(values, sizeof values);
     }
-    call_free(craft);
+    call_free(made);
     return true;
 }
 
