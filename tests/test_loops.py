@@ -182,6 +182,8 @@ def test_both_schemes_are_of_first_order() -> None:
 
 
 @pytest.mark.once
+@pytest.mark.usefixtures("complete_native_fmu")
+@FMI_2
 def test_the_command_writes_what_is_committed(tmp_path: Path) -> None:
     """The rows that the quick one has."""
     done = CliRunner().invoke(commands, ["measure", "coupling", "--quick", "--output", str(tmp_path)])

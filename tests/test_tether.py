@@ -23,13 +23,13 @@ from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import State
 from hovercraft_fmu.model.integrators import INTEGRATORS
 from hovercraft_fmu.model.subcycling import Settings
-from hovercraft_fmu.studies.tow import WITH_DERIVATIVES, cases, growth, limits
+from hovercraft_fmu.studies.tow import WITH_DERIVATIVES, cases, grown, limits
 from hovercraft_fmu.tether.line import Line, pull
 from hovercraft_fmu.tether.tether_native import TETHER_NATIVE, TETHER_NATIVE3
 from hovercraft_fmu.tether.tether_package import build_tether
 from hovercraft_fmu.towing import BEND, COLUMNS, Tow, haul, haul_bare
 from hovercraft_fmu.validation import validate_ssp
-from tests.conftest import Built
+from tests.conftest import FMI_2, Built
 from tests.native import c_compiler
 from tests.strategies import states
 from tests.tow_masters import CONNECTIONS, MASTERS, SHOWN, STARTS, STRAIGHT
@@ -193,17 +193,22 @@ def test_a_line_without_damping_gains_energy_as_the_theory_says(scheme: str, sha
     assert rate == pytest.approx(share * h * omega**2 / 4, rel=0.03)  # of first order in H*w = 0.04
 
 
-def test_how_long_a_step_may_be_and_what_held_forces_add() -> None:
-    """Against the limits of Jury's criterion by hand, 4*zeta and 1/zeta, those of the late force (a quarter or so), and
-    the growth of a line without damping to first order in H*w.
-    """
+def test_how_long_a_step_may_be() -> None:
+    """Against the limits of Jury's criterion by hand, 4*zeta and 1/zeta, and of the late force, a quarter or so."""
     dampings, lines, schemes = (0.05, 0.5, 1.0), ((2.0, 100.0), (2000.0, 1.0)), (GAUSS_SEIDEL, JACOBI)
     found = limits(cases(dampings, lines, schemes)).reshape(2, 3, 2)
     for of_line in found:  # whatever its stiffness and the masses
         assert of_line[:, 0] == pytest.approx([0.2, 2.0, 1.0], rel=0.02)
         assert of_line[:, 1] == pytest.approx([0.067, 0.482, 0.427], rel=0.02)
-    rates = growth(cases((0.0,), ((2.0, 1.0),), (GAUSS_SEIDEL, JACOBI, WITH_DERIVATIVES)), np.full(3, 0.05))
-    assert rates == pytest.approx([0.05 / 4, 3 * 0.05 / 4, 0.0], abs=3e-4)  # the next term, and roundings
+
+
+@FMI_2
+def test_what_held_forces_add_and_derivatives_save(native_fmu: Path, each_native_tether: Path) -> None:
+    """By FMUs: a line without damping grows by H*w/4 and three times that, to first order; not by derivatives."""
+    found = [grown(native_fmu, each_native_tether, each, 0.05) for each in (GAUSS_SEIDEL, JACOBI, WITH_DERIVATIVES)]
+    assert [each.rate for each in found[:2]] == pytest.approx([0.05 / 4, 3 * 0.05 / 4], rel=0.01)  # the next term
+    assert abs(found[2].rate) < 1e-6  # roundings
+    assert [each.calls for each in found] == [9.0, 9.0, 11.0]  # set, step and get of three; and two derivatives
 
 
 @pytest.mark.parametrize("master", MASTERS)

@@ -17,6 +17,7 @@ Neither stiffness nor masses are left in it: one curve for all. The energy grows
 """
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -26,11 +27,17 @@ from numpy.typing import NDArray
 from ..coupling import GAUSS_SEIDEL, JACOBI
 from ..drawing.figures import new_figure
 from ..drawing.palette import INK, OTHER, SEA
+from ..fmu.interface import BY_NAME
+from ..fmu.native_package import build_native_fmu
+from ..host import Fmu, Instance
 from ..host.fleet import Crafts, advance_fleet
 from ..model.dynamics import State
 from ..model.integrators import integrator
 from ..model.subcycling import Settings
 from ..tether.line import Line, pull
+from ..tether.tether_interface import CRAFT, PARAMETERS
+from ..tether.tether_package import build_native_tether
+from ..whole import temporary_folder
 from .laboratory import Findings, Shown, Tell
 
 if TYPE_CHECKING:
@@ -49,11 +56,15 @@ PULL = 1000.0
 """N, mean: so that the line stays taut."""
 SMALL = 1e-9
 """m: what the oscillation begins with, beside a mean stretch of at least half a metre."""
+SMALL_OF_FREE = 1e-5
+"""m: the same of the line without damping, whose mean stretch is 500 m."""
 LARGE = 1e6
 """Times that: up to there growth is fitted."""
 COUNT = 300
 """Communication steps."""
 HALVINGS = 12
+FOLLOWS = [BY_NAME["acceleration.x"].reference], [BY_NAME["external.force.x"].reference], [1.0]
+"""The directional derivative that is asked for: 1/kg."""
 
 
 class Cases(NamedTuple):
@@ -101,7 +112,7 @@ def amplitudes(chosen: Cases, a: Array, count: int = COUNT) -> Array:
     states = np.zeros((6, 2 * n))
     states[0, :n] = 10.0 + mean + SMALL
     crafts = Crafts(mass=np.concatenate([chosen.first, chosen.second]), drag_coefficient=0.0)
-    late, middle = chosen.scheme == JACOBI, chosen.scheme == WITH_DERIVATIVES
+    late = chosen.scheme == JACOBI
     settings, steps, before = Settings(cast(Any, np.tile(h, 2)), integrator(3)), np.tile(h, 2), np.zeros(n)
     found = np.empty((count, n))
     for k in range(count):
@@ -111,10 +122,7 @@ def amplitudes(chosen: Cases, a: Array, count: int = COUNT) -> Array:
             pull(State(*first), State(*second), line).tension
             for first, second, line in zip(states[:, :n].T.tolist(), states[:, n:].T.tolist(), lines, strict=True)
         ])  # fmt: skip
-        # what the derivatives tell of the middle: the force goes on with the stretch, and with what it does itself
-        ahead = told + 0.5 * h * chosen.stiffness * speed
-        change = 1.0 + (h * h * chosen.stiffness / 8.0 + 0.5 * h * damping) / chosen.reduced
-        tension = np.where(middle, PULL + (ahead - PULL) / change, np.where(late & (k > 0), before, told))
+        tension = np.where(late & (k > 0), before, told)
         before = told
         controls = np.zeros((8, 2 * n))
         controls[5] = np.concatenate([PULL - tension, tension - PULL])  # each is pulled outward as much
@@ -158,13 +166,76 @@ def limit_of_theory(scheme: str, zeta: float) -> float:
     return low
 
 
-def growth(chosen: Cases, a: Array) -> Array:
-    """1: of the amplitude, in units of w a second, fitted over the run."""
-    rates = []
-    for step, size in zip(a.tolist(), amplitudes(chosen, a, 2 * COUNT).T, strict=True):
-        taut = size < LARGE * SMALL  # then the line is, too
-        rates.append(np.polyfit(step * np.flatnonzero(taut), np.log(size[taut]), 1)[0])
-    return np.array(rates)
+class Grown(NamedTuple):
+    """A line without damping, by three FMUs."""
+
+    rate: float
+    """1: of the amplitude, in units of w a second, fitted over the run"""
+    calls: float
+    """Of functions of the three, in a communication step"""
+
+
+def grown(craft: Path, tether: Path, scheme: str, a: float, count: int = 2 * COUNT) -> Grown:
+    """`count` steps of the native FMUs; the line is the first of LINES, `a` is H*w.
+
+    A master that knows derivatives asks the craft how the accelerations follow the forces, and the tether once for its
+    own two: stiffness and damping.
+    """
+    with (
+        Fmu(craft) as craft_fmu, Fmu(tether) as tether_fmu, craft_fmu.instance() as first,
+        craft_fmu.instance() as second, tether_fmu.instance() as line,
+    ):  # fmt: skip
+        free = _FreeLine(first, second, line, a)
+        found = np.array([free.step(i, scheme) for i in range(count)])
+    taut = found < LARGE * SMALL_OF_FREE  # then the line is, too
+    rate = float(np.polyfit(a * np.flatnonzero(taut), np.log(found[taut]), 1)[0])
+    return Grown(rate, free.calls / count)
+
+
+class _FreeLine:
+    """Two craft of a mass, pulled outward, and a line without damping; `calls` counts what steps ask of the FMUs."""
+
+    def __init__(self, first: Instance, second: Instance, line: Instance, a: float) -> None:
+        stiffness, mass = LINES[0][0], 100.0
+        self.omega = float(np.sqrt(2.0 * stiffness / mass))
+        self.calls, self._h, self._length = 0, a / self.omega, 10.0 + PULL / stiffness
+        self._both, self._line = (first, second), line
+        craft = {"mass": mass, "drag_coefficient": 0.0, "integrator_number": 3, "step_size": self._h}
+        x = self._length + SMALL_OF_FREE
+        first.start({**craft, "pose.x": x})
+        second.start(craft)
+        given = {name: 0.0 for name in PARAMETERS if "attachment" in name or name == "damping"}
+        line.start({**given, "stiffness": stiffness, "slack_length": 10.0, "first.pose.x": x})
+        self._motions = [each.port("pose.x", "velocity.x") for each in self._both]
+        self._forces = [each.port("external.force.x") for each in self._both]
+        self._ends = line.port(*(f"{each}.{name}" for each in CRAFT for name in ("pose.x", "velocity.x")))
+        self._tension = line.port("tension")
+        self._slopes = line.port("stiffness", "damping").get()
+
+    def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        self.calls += 1
+        return function(*arguments)
+
+    def step(self, i: int, scheme: str) -> float:
+        """m: the amplitude before it."""
+        (x, vx), (other_x, other_vx) = (self._call(each.get) for each in self._motions)
+        before = self._call(self._tension.get)[0] if scheme == JACOBI else 0.0
+        self._call(self._ends.set, (x, vx, other_x, other_vx))
+        self._call(self._line.step, i * self._h, self._h)
+        tension = before if scheme == JACOBI else self._call(self._tension.get)[0]
+        if scheme == WITH_DERIVATIVES:
+            tension = self._middle(tension, vx - other_vx)
+        for each, force, sign in zip(self._both, self._forces, (1.0, -1.0), strict=True):
+            self._call(force.set, [sign * (PULL - tension)])
+            self._call(each.step, i * self._h, self._h)
+        return float(np.hypot(x - other_x - self._length, (vx - other_vx) / self.omega))
+
+    def _middle(self, tension: float, speed: float) -> float:
+        """N: in the middle of the step: the force goes on with the stretch, and with what it does itself."""
+        h, (k, c) = self._h, self._slopes
+        light = sum(self._call(each.fmpy.getDirectionalDerivative, *FOLLOWS)[0] for each in self._both)  # 1/kg
+        ahead = tension + 0.5 * h * k * speed
+        return float(PULL + (ahead - PULL) / (1.0 + (h * h * k / 8.0 + 0.5 * h * c) * light))
 
 
 def measure(quick: bool, tell: Tell) -> Findings:
@@ -175,28 +246,47 @@ def measure(quick: bool, tell: Tell) -> Findings:
     ratio = chosen.first / chosen.second
     found = pl.DataFrame({"scheme": chosen.scheme.tolist(), "damping_ratio": chosen.damping, "limit": limit,
                           "stiffness": chosen.stiffness, "mass_ratio": ratio, "theory": theory})  # fmt: skip
-    steps = [(s, a) for s in SCHEMES for a in STEPS]
-    free = cases((0.0,), LINES[:1], [s for s, _ in steps])
-    a = np.array([step for _, step in steps])
-    rates = growth(free, a)
-    expected = [float(np.log(np.abs(roots(s, step, 0.0)).max()) / step) for s, step in steps]
-    grown = pl.DataFrame({"scheme": [s for s, _ in steps], "step": a, "growth": rates, "theory": expected,
-                          "energy": 2.0 * rates})  # fmt: skip
+    free = _growth()
     off = float((found["limit"] / found["theory"] - 1.0).abs().max())  # type: ignore[arg-type]
     wide = found.group_by("scheme", "damping_ratio").agg(
         pl.col("limit").min().alias("least"), pl.col("limit").max().alias("largest"), pl.col("theory").first()
     )
     return Findings(
-        {"tow_limits": found, "tow_growth": grown},
+        {"tow_limits": found, "tow_growth": free},
         [
             Shown(
                 "A tow: the largest stable H*w, over all stiffnesses and mass ratios",
                 wide.sort("scheme", "damping_ratio"),
             ),
-            Shown("A line without damping: growth of the amplitude, and of the energy, in w a second", grown),
+            Shown("A line without damping, by FMUs: growth of amplitude and energy, and calls of FMUs, in 1/w", free),
         ],
-        {"tow": draw(found, grown)},
-        [f"limits of a tow: {off:.1%} from the theory at most, whatever stiffness and masses are"],
+        {"tow": draw(found, free)},
+        [f"limits of a tow: {off:.1%} from the theory at most, whatever stiffness and masses are", _cost(free)],
+    )
+
+
+def _growth() -> pl.DataFrame:
+    """Of a line without damping, for every scheme and step; energy and calls are those of the time 1/w."""
+    rows = []
+    with temporary_folder() as place:
+        files = build_native_fmu(Path(place) / "Craft.fmu"), build_native_tether(Path(place) / "Tether.fmu")
+        for scheme in SCHEMES:
+            for a in STEPS:
+                rate, calls = grown(*files, scheme, a)
+                theory = float(np.log(np.abs(roots(scheme, a, 0.0)).max()) / a)
+                rows.append((scheme, a, rate, theory, 2.0 * rate, calls / a))
+    return pl.DataFrame(rows, schema=["scheme", "step", "growth", "theory", "energy", "calls"], orient="row")
+
+
+def _cost(free: pl.DataFrame) -> str:
+    """What a small step costs and gains, and what derivatives do."""
+    by = {(scheme, step): (energy, calls) for scheme, step, _, _, energy, calls in free.iter_rows()}
+    (small, many), (large, few) = by[GAUSS_SEIDEL, STEPS[0]], by[GAUSS_SEIDEL, STEPS[-1]]
+    energy, calls = by[WITH_DERIVATIVES, STEPS[-1]]
+    return (
+        f"a line without damping: {STEPS[-1] / STEPS[0]:.0f} times the calls of FMUs ({few:.1f}, {many:.0f} in 1/w) "
+        f"bring the energy that is added from {large:.1%} to {small:.1%}; derivatives cost "
+        f"{calls / few - 1.0:.0%} more calls ({calls:.1f}) and add {abs(energy):.0e}"
     )
 
 
