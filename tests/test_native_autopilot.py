@@ -14,7 +14,7 @@ import fmpy
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, DEMO_COURSE
+from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL, DEMO_COURSE, STATUS
 from hovercraft_fmu.autopilot.pilot_native import AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3
 from hovercraft_fmu.building.ssp import build_ssp
 from hovercraft_fmu.coupling import sail
@@ -117,6 +117,39 @@ def test_the_loop_of_native_fmus_runs_where_there_is_no_python(
     assert done.returncode == 0, done.stderr
     passage = sail("calm", each_native_fmu, each_native_autopilot, stop_time=300.0)
     assert [float(each) for each in done.stdout.split()] == [passage[name][-1] for name in STATES]
+
+
+def test_all_that_it_tells_is_said_once_in_the_same_words(each_autopilot: Path) -> None:
+    """A voyage on which everything goes wrong, one thing after the other, and goes on going wrong."""
+    aside, no_gains = {"pose.x": 100.0, "pose.y": 20.0}, {"steering_force": 0.0}
+    voyage: list[tuple[int, dict[str, float], float]] = [
+        (64, {"turn_back": 1}, 2.0),
+        (4, {"pose.x": -400.0}, 0.1),
+        (32, {"velocity_gain": 100.0, "integral_time": 10.0}, 100.0),
+        (16, {"heading_gain": 2.0, "pose.heading": 2.0}, 100.0),
+        (0, {"pose.x": 80.0, "pose.y": 0.0}, 0.1),
+        (0, aside, 0.1),
+        (0, {"pose.x": 120.0, "pose.y": 0.0}, 0.1),
+        (0, {"pose.x": 100.0, "pose.y": -20.0}, 0.1),
+        (8, {"pose.x": 79.0, "pose.y": 1.0}, 0.1),
+        (2, {**aside, "turn_back": 0}, 0.1),
+        (128, no_gains, 0.1),
+        (1, {"acceptance_radius": 1000.0}, 0.1),
+    ]
+    with Fmu(each_autopilot, AUTOPILOT_MODEL.name) as opened, opened.instance() as pilot:
+        status = pilot.port("status")
+        pilot.start()
+        time, told, expected = 0.0, 0, []
+        for bit, values, duration in voyage:
+            pilot.set(values)
+            told |= bit
+            expected += [f"status {bit}: {STATUS[bit]} (said once)"] if bit else []
+            for _ in range(3):  # what it says it says with one of them
+                pilot.step(time, duration)
+                time += duration
+            assert status.get() == [told]
+            assert pilot.messages == expected
+    assert told == 255
 
 
 # ---- faults: the words of the Python one, and nothing is lost

@@ -47,6 +47,8 @@ INERTIAS = (125.0, 250.0, 500.0, 1000.0, 2000.0)
 """kg.m2, at 100 kg"""
 GAINS = (5.0, 7.0, 10.0, 14.0, 20.0)
 """s/rad, of the yaw rate; that of the heading critically damped without any air"""
+TICKS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+"""s, on the axis of the chart"""
 SAMPLES = 90
 """Communication steps of a leg."""
 LONGEST, SHORTEST, FINEST = 64.0, 0.02, 1.03
@@ -187,11 +189,15 @@ def draw(found: pl.DataFrame) -> "Figure":
             axes.loglog(own["value"], own["measured"], color=style.color, marker=style.marker, markersize=5,
                         linestyle="", label=f"{air}, {scheme}")  # fmt: skip
         own = found.filter(varied=varied, air="ice", scheme=JACOBI).sort("value")
-        axes.loglog(own["value"], own["warned_of"], color=QUIET, linestyle=":", label="warned of beyond")
+        axes.fill_between(own["value"], own["warned_of"], LONGEST, color=QUIET, alpha=0.12, linewidth=0.0,
+                          label="warned of")  # fmt: skip
         axes.set_xlabel(label)
         axes.set_xticks(own["value"], [f"{value:g}" for value in own["value"]])
         axes.set_xticks([], minor=True)
         axes.grid(which="both", alpha=0.2)
+    panels[0].set_ylim(0.25, 40.0)
+    panels[0].set_yticks(TICKS, [f"{value:g}" for value in TICKS])
+    panels[0].set_yticks([], minor=True)
     panels[0].set_ylabel("longest stable communication step [s]")
     panels[0].legend(frameon=False, fontsize="small")
     figure.suptitle("The limit of the communication step: theory (lines) and law and craft in the loop (markers)")
