@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu.interface import CRAFT_PARAMETERS, INPUTS, STATES, STEP_TURNS, STEP_UNSTABLE
+from hovercraft_fmu.host.fleet import Crafts
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import INTEGRATORS, MIN_STEP, StepTooSmallError, integrator, integrator_number
@@ -25,17 +26,20 @@ from hovercraft_fmu.studies.extremes import (
     ACCURATE,
     FAILED,
     FIXED,
+    LEADS,
+    RK4,
     SAMPLINGS,
     SILENT,
-    SUBSTEPS,
-    WITH_TERMS,
     Batch,
     Judged,
+    advanced,
     chosen,
     judge,
+    made,
     measure_extremes,
     sample,
     shares,
+    watched,
 )
 from hovercraft_fmu.studies.limits import OFF, RIGHT, drawn, outcome
 from hovercraft_fmu.studies.stability import QUALITIES, THEORY, Motion, largest_step, motions
@@ -91,21 +95,25 @@ def test_the_limits_of_the_fmu_are_where_the_terminal_speed_is_left(method: Any)
 @pytest.fixture(scope="module")
 def extremes() -> list[dict[str, Any]]:
     """The rows of the table."""
-    return shares(measure_extremes(12288, seed=20)).to_dicts()
+    return shares(measure_extremes(6144, seed=20, size=2048)).to_dicts()
 
 
 def test_no_run_is_wrong_in_silence(extremes: list[dict[str, Any]]) -> None:
     for share in extremes:
         assert share["silent"] == 0.0
         # the theory's 1/2 of the bound, and what the reference may err; with friction and kinks, what was seen
-        assert share["worst"] <= (0.95 if share["sampling"] == WITH_TERMS else 0.6)
+        assert share["worst"] <= (0.97 if SAMPLINGS[share["sampling"]].terms else 0.6)
+        assert share["worst_way"] <= 0.6
         assert share["doubt"] <= 0.5
         assert share["accurate"] + share["vague"] + share["warned"] + share["failed"] == pytest.approx(1.0)
 
 
 def test_not_everything_warns(extremes: list[dict[str, Any]]) -> None:
-    """Shares of 12 288 runs: their scatter is below half a percent."""
+    """Shares of 6144 runs: their scatter is below a percent."""
     for share in extremes:
+        if share["runs"] < 6144:  # 48 long ones
+            assert share["accurate"] > 0.2
+            continue
         own = share["sampling"] != next(iter(SAMPLINGS))
         assert share["accurate"] > (0.7 if own else 0.2)  # within a bound that says something
         assert share["warned"] > (0.03 if own else 0.2)
@@ -130,12 +138,42 @@ def test_a_warning_means_something(method: Any) -> None:
 
 
 @settings(max_examples=40)
-@given(st.integers(0, 2**32 - 1), st.sampled_from(SUBSTEPS[:3]), st.sampled_from(list(SAMPLINGS)))
+@given(st.integers(0, 2**32 - 1), st.sampled_from((1, 4, 16)), st.sampled_from(list(SAMPLINGS)))
 def test_whatever_is_drawn_has_a_verdict(seed: int, substeps: int, sampling: str) -> None:
     runs = sample(np.random.default_rng(seed), 256, substeps, sampling)
     for name, judged in judge(runs).items():
         wrong = np.flatnonzero(judged.verdict == SILENT)
         assert not len(wrong), (name, chosen(runs, wrong[:1]))
+
+
+def test_where_the_reference_needs_finer_steps_there_is_a_verdict() -> None:
+    """A thruster turns a craft that is easy to turn, against a rotational drag 1600 times too steep for the sub-step.
+
+    RK4 leaves the numbers at a 32nd of it, too. Splitting is stopped again in every sub-step, and warns of nothing: the
+    bound is one that promises nothing.
+    """
+    craft = Crafts(mass=1322.0, inertia=0.195, length=14.67, air_density=884.0, drag_center_fraction=0.0,
+                   steering_force=2.4e5, rotational_drag=0.106, skirt_friction=0.127)  # fmt: skip
+    runs = made(craft, Controls(0.0, 0.426, 0.0), State(vx=0.05), np.full(1, 2.9e-4), 16)
+    assert np.isnan(advanced(runs, RK4, runs.start, 16, 32)[0].yaw_rate)
+    judged = judge(runs, [method for method in FIXED if method.name == "splitting"])["splitting"]
+    assert np.isfinite(judged.error)
+    assert judged.verdict == ACCURATE
+    assert judged.bound > 1.0
+
+
+@pytest.mark.parametrize("name", ["drag_implicit", "splitting"])
+def test_with_the_drag_centre_in_front_a_swing_grows_and_energy_does_not(name: str) -> None:
+    """Over 10 000 sub-steps, of whatever length; relative, 10 000 roundings."""
+    method = next(each for each in FIXED if each.name == name)
+    runs = sample(np.random.default_rng(4), 128, 10_000, LEADS)
+    ends = watched(runs, method).end
+    off = np.arctan2(np.sin(ends.heading - runs.start.heading), np.cos(ends.heading - runs.start.heading))
+    assert np.mean(np.abs(off) > 1.0) > 0.05  # of a tenth; many stop before, or have not yet
+    for i in range(128):
+        craft, _, start, _ = single(runs, i)
+        end = State(*(float(np.asarray(values)[i]) for values in ends))
+        assert kinetic_energy(end, craft) <= kinetic_energy(start, craft) * (1.0 + 1e-11)
 
 
 @FIXED_STEP
@@ -159,6 +197,8 @@ def test_the_quick_study_finds_what_is_committed(tmp_path: Path) -> None:
     for name, columns in keys.items():
         committed = {tuple(row[key] for key in columns): row for row in records(RESULTS / f"{name}.csv")}
         for row in records(tmp_path / f"{name}.csv"):
+            if int(row.get("runs", 1024)) < 1024:
+                continue
             before = committed[tuple(row[key] for key in columns)]
             for column in {"smallest", "warned", "accurate", "silent"} & row.keys():
                 near = 5e-3 if column == "smallest" else 0.05
@@ -244,7 +284,7 @@ def test_the_adaptive_method_takes_any_first_step(name: str, x: float) -> None:
 # ---- the same on the real FMU
 
 REPEATED = 336
-"""Runs a method; 1008 of the three."""
+"""Runs a method, half as many of each of three ways to draw them."""
 STEPS = 16
 """Communication steps of one sub-step each: enough for a motion that runs away to get beyond all numbers."""
 
@@ -287,7 +327,7 @@ def on_the_fmu(instances: list[Any], method: Any, runs: Batch, i: int) -> tuple[
 def test_the_fmu_agrees_with_the_verdicts(instances: list[Any], method: Any) -> None:
     rng = np.random.default_rng(11)
     compared = failed = 0
-    for sampling in SAMPLINGS:
+    for sampling in list(SAMPLINGS)[:3]:
         runs = sample(rng, REPEATED // 2, STEPS, sampling)
         judged = judge(runs, [method])[method.name]
         sigma, rho = judged.numbers.sigma, judged.numbers.rho
