@@ -74,6 +74,11 @@ def test_every_page_has_a_list_of_its_sections(flavour: Flavour) -> None:
         assert {link for link in Links(page).found if link.startswith("#")} == {f"#{anchor}" for anchor in anchors}
 
 
+def test_no_page_shows_its_marks() -> None:
+    """`<br>` in a cell of a table would be seen as text."""
+    assert [name for name, page in pages().items() if b"&lt;br" in page] == []
+
+
 def test_formulas_are_mathml_and_variables_are_in_groups() -> None:
     page = document.pages(NATIVE)["index.html"]
     formulas = [

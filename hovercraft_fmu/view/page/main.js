@@ -408,7 +408,7 @@ const go = (now) => {
 requestAnimationFrame(go);
 addEventListener("hashchange", () => location.reload());
 /** @param {string} name @param {number} ratio */
-const priced = (name, ratio) => write(`price-${name}`, `× ${ratio.toFixed(2)}`);
+const priced = (name, ratio) => write(`price-${name}`, ratio > 0 && ratio < Infinity ? `× ${ratio.toFixed(2)}` : "…");
 setTimeout(() => measurePrices(library, description, data.terms, priced), 500);
 // for the console: the same calls, from there
 Object.assign(globalThis, { hovercraft: { page, library, description, data, Instance, Flight, Helm, Reel } });

@@ -9,7 +9,7 @@ const DURATION = 60; // s, of the run: 60 000 sub-steps, well above what the clo
  * @param {import("./fmu.js").Library} library
  * @param {import("./fmu.js").Description} description
  * @param {import("./settings.js").Term[]} terms
- * @param {(name: string, ratio: number) => void} tell
+ * @param {(name: string, ratio: number) => void} tell what is not finite or 0: the clock of this browser is too coarse
  */
 export async function measurePrices(library, description, terms, tell) {
   const none = { name: "", label: "", values: {}, input: false };
