@@ -223,9 +223,21 @@ def test_what_is_written_is_read_and_gives_the_same_motion(shell: Shell) -> None
     (shell.folder / "log.csv").write_text("time,thrust,port_thruster\n0,5,0\n3.3,8,1\n3.3,2,1\n7.2,2,0\n")
     first = shell.ok("simulate", "--input", "log.csv", *options, "--output", "result.csv")
     again = shell.ok("simulate", "--input", "result.csv", *options, "--output", "again.csv")
+    assert "result.csv is a result: its inputs are used, not its outputs" in again
+    assert "warning" not in again
     found, expected = (each.partition("duration")[2].partition("wrote")[0] for each in (again, first))
     assert found == expected != ""
     assert (shell.folder / "result.csv").read_bytes() == (shell.folder / "again.csv").read_bytes()
+
+
+@pytest.mark.usefixtures("native_at_hand")
+def test_columns_that_are_not_used_are_named(shell: Shell) -> None:
+    (shell.folder / "log.csv").write_text("time,thrust,pose.x,pose.y,speed\n0,5,7,0,0\n1,5,8,0,1\n")
+    printed = shell.ok("simulate", "--input", "log.csv")
+    assert "log.csv: columns not used: pose.x, pose.y, speed\n" in printed
+    assert "warning: log.csv begins elsewhere than the run: pose.x = 7, not 0 (--set)" in printed
+    assert "warning" not in shell.ok("simulate", "--input", "log.csv", "--set", "pose.x=7")
+    assert shell.ok("simulate", "--input", "log.csv", "-q") == ""
 
 
 @pytest.mark.usefixtures("native_at_hand")
@@ -313,7 +325,7 @@ def test_a_run_is_compared_with_a_stored_one(shell: Shell, ending: str) -> None:
     short = ("simulate", "--scene", "turn", "--stop-time", "8", "--set", "step_size=0.1")
     shell.ok(*short, "--output", f"a/stored.{ending}")
     same = ("--reference", f"a/stored.{ending}")
-    assert "28 columns are those of" in shell.ok(*short, *same, "--within", "0")
+    assert "31 columns are those of" in shell.ok(*short, *same, "--within", "0")
     other = shell.run(*short, *same, "--set", "mass=100.001")
     assert other.status == 1
     assert re.search(r"^pose.x +\d\S+ +[\d.]+ s +FAILED$", other.out, re.MULTILINE)
@@ -331,8 +343,30 @@ def test_a_stored_result_of_another_host(shell: Shell) -> None:
         rows = list(csv.DictReader(file))
     for name, value in (("good", rows[5]["pose.x"]), ("bad", "nan")):
         (shell.folder / f"{name}.csv").write_text(f"time,pose.x\n0,0\n{rows[5]['time']},{value}\n")
-    assert "1 columns are those of good.csv" in shell.ok(*short, "--reference", "good.csv", "--within", "0")
+    assert "1 column is that of good.csv" in shell.ok(*short, "--reference", "good.csv", "--within", "0")
     assert "pose.x by inf at" in shell.run(*short, "--reference", "bad.csv").err
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("time,pose.x\n0,0\n1,0\n0.5,0\n", "time = 0.5 in row 3: must not go back; before it is 1.0"),
+        ("time,pose.x\n0,0\nnan,0\n", "time = nan in row 2: must be a finite number"),
+        ("time,pose.x,pose.x\n0,0,0\n", "column 'pose.x': must stand there once"),
+        ("time,height\n0,0\n", "must have a column of a result beside the time; it has time, height"),
+    ],
+)
+def test_a_reference_that_is_none_is_refused_before_the_run(text: str, why: str, shell: Shell) -> None:
+    (shell.folder / "stored.csv").write_text(text)
+    assert f"stored.csv: {why}" in shell.refused("simulate", "--reference", "stored.csv")
+    assert not (shell.folder / "build").exists()
+
+
+@pytest.mark.parametrize("within", ["nan", "inf", "-1"])
+def test_a_tolerance_must_be_one(within: str, shell: Shell) -> None:
+    refused = shell.refused("simulate", "--reference", "nix.csv", "--within", within, status=2)
+    assert f"--within {float(within)}: must be a finite number, at least 0" in refused
+    assert "--within: must be given together with --reference" in shell.refused("simulate", "--within", "3", status=2)
 
 
 @pytest.mark.parametrize("width", [40, 80, 160])

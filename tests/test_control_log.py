@@ -113,5 +113,5 @@ def test_a_record_that_was_cut_is_told_from_one_that_is_whole(tmp_path: Path) ->
     path, rows = tmp_path / "log.csv", f"time,thrust\n{RECORDED}\n0.0,5.0\n0.5,5.0\n1.0,7"
     for end, cut, last in (("", True, 0.5), (".5\n", True, 1.0), (f".5\n{ENDED}by the operator\n", False, 1.0)):
         path.write_text(rows + end)
-        table, is_cut = read_control_log(path)
+        table, is_cut, *_ = read_control_log(path)
         assert (is_cut, table["time"][-1]) == (cut, last)

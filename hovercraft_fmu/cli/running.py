@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from ..building import Kind
     from ..simulation import Advice, Difference, Inputs, Result, Run
 
+WITHIN = 1e-9
+"""Of a stored result, where nothing else is asked for."""
+
 
 @click.command("simulate")
 @of_an_fmu
@@ -35,7 +38,8 @@ if TYPE_CHECKING:
 @set_option
 @click.option(
     "--output", type=PathOf(path_type=Path), metavar="FILE.csv|FILE.parquet",
-    help="Write all columns; as --input a CSV file gives the same motion again.",
+    help="Write all columns. As --input a CSV file gives the same inputs again; preset, start values and communication "
+    "step are to be given again.",
 )  # fmt: skip
 @click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png|.svg|.pdf", help="Draw the run.")
 @click.option(
@@ -50,8 +54,10 @@ if TYPE_CHECKING:
 @click.option("--error", is_flag=True, help="Have the FMU tell how far it is off; three times the cost.")
 @click.option("--reference", type=PathOf(path_type=Path), metavar="FILE.csv|.parquet",
               help="Compare the run with a stored result, column by column; fails where one is off.")  # fmt: skip
-@click.option("--within", type=float, metavar="X", default=1e-9, show_default=True,
-              help="With --reference: how far off a value may be; relative where it is above 1.")  # fmt: skip
+@click.option(
+    "--within", type=float, metavar="X",
+    help=f"With --reference: how far off a value may be (default {WITHIN:g}); relative where it is above 1.",
+)  # fmt: skip
 @json_option
 @click.option("--list-scenes", is_flag=True, help="List the named scenes and stop.")
 def simulate(
@@ -66,7 +72,7 @@ def simulate(
     against: str | None,
     error: bool,
     reference: Path | None,
-    within: float,
+    within: float | None,
     as_json: bool,
     list_scenes: bool,
     **options: Any,
@@ -83,6 +89,10 @@ def simulate(
         raise click.UsageError("--scene and --input: must not be given together")
     if against is not None and not animation:
         raise click.UsageError("--against: must be given together with --animate")
+    if within is not None and not reference:
+        raise click.UsageError("--within: must be given together with --reference")
+    if within is not None and not 0.0 <= within < math.inf:
+        raise click.UsageError(f"--within {within}: must be a finite number, at least 0")
     start_values = settings_of((*settings, "error_estimate=on") if error else settings)
     inputs: Inputs = log if log else scene or "launch"
     others = [{**start_values, **settings_of(against.split(","), "--against")}] if against is not None else []
@@ -94,10 +104,12 @@ def simulate(
         OUTPUT.print(f"{runs[0].title} has one row: it holds for the default duration, {duration:g} s (--stop-time)")
     if runs[0].cut:
         OUTPUT.print(f"{runs[0].title}: the record was cut, it does not say how it ended: at most a second is missing")
+    _say_unused(runs[0])
     path = named_fmu(fmu, kind)
     results = [simulated(run, path) for run in runs]
     for result in results:
         print_result(result)
+    _compare_starts(results[0])
     write(results[0], output, plot)
     if animation:
         _animate(results, animation)
@@ -105,7 +117,7 @@ def simulate(
     if as_json:
         print_json({**results[0].summary, "fmu": path, "reference": [each._asdict() for each in off]})
     if stored is not None:
-        _judge(off, str(reference), within)
+        _judge(off, str(reference), WITHIN if within is None else within)
     return None
 
 
@@ -212,6 +224,30 @@ def drive(
     OUTPUT.print(f"ended at ({end.x:.3f}, {end.y:.3f}) m, heading {math.degrees(end.heading):.2f} deg")
 
 
+def _say_unused(run: "Run") -> None:
+    """What is in the inputs' file and not used: of a result all but the inputs."""
+    from ..fmu.interface import OUTPUTS
+
+    if set(OUTPUTS) <= set(run.unused):
+        OUTPUT.print(
+            f"{run.title} is a result: its inputs are used, not its outputs and the settings that it was made with"
+        )
+    elif run.unused:
+        OUTPUT.print(f"{run.title}: columns not used: {', '.join(run.unused)}")
+
+
+def _compare_starts(result: "Result") -> None:
+    """Say where the states in the first row of the inputs' file are not those that the run began with."""
+    begun = {name: float(result[name][0]) for name, _ in result.run.begins}
+    off = [
+        f"{name} = {value:g}, not {begun[name]:g}"
+        for name, value in result.run.begins
+        if not math.isclose(value, begun[name], rel_tol=1e-9, abs_tol=1e-9)
+    ]
+    if off:
+        OUTPUT.print(f"warning: {result.run.title} begins elsewhere than the run: {', '.join(off)} (--set)")
+
+
 def simulated(run: "Run", fmu: Path) -> "Result":
     """Run it, and tell how far it is."""
     from ..simulation import run_fmu
@@ -257,7 +293,7 @@ def _judge(found: "Sequence[Difference]", reference: str, within: float) -> None
     if wrong:
         worst = f"{wrong[0].column} by {wrong[0].largest:.3g} at {wrong[0].time:g} s"
         raise click.ClickException(f"{len(wrong)} of {len(found)} columns differ from {reference}, most {worst}")
-    OUTPUT.print(f"{len(found)} columns are those of {reference}")
+    OUTPUT.print(f"{len(found)} column{'s are those' if len(found) > 1 else ' is that'} of {reference}")
 
 
 def print_result(result: "Result") -> None:

@@ -1,14 +1,17 @@
 """A run beside a result that was stored: how far each column is off."""
 
 import csv
+import math
 import os
 from collections.abc import Mapping
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .control_log import SHOWN
 from .result import Result, check_output
 
 
@@ -26,13 +29,15 @@ def read_columns(path: str | os.PathLike[str]) -> dict[str, NDArray[np.float64]]
     """A stored result, of this package or of another host: CSV or Parquet, the columns `time` and names of variables.
 
     Raises:
-        ValueError: the name ends in neither; no column `time`; what is no number.
+        ValueError: the name ends in neither; no column `time`, or none of a result; a column twice; time that goes
+            back; what is no number.
         ModuleNotFoundError, OSError: it cannot be read.
     """
     path = check_output(path, "reference")
     if path.suffix == ".parquet":
         table = import_module("pyarrow.parquet").read_table(path)
-        columns = {name: table[name].to_numpy().astype(np.float64) for name in table.column_names}
+        names = list(table.column_names)
+        arrays = [column.to_numpy().astype(np.float64) for column in table.columns]
     else:
         with path.open(newline="", encoding="utf-8-sig") as file:
             names, *rows = list(csv.reader(file)) or [[]]
@@ -42,10 +47,24 @@ def read_columns(path: str | os.PathLike[str]) -> dict[str, NDArray[np.float64]]
             raise ValueError(
                 f"{path}: every row must have a number for each of {len(names)} columns; {error}"
             ) from error
-        columns = {name.strip(): values[:, i] for i, name in enumerate(names)}
+        names, arrays = [name.strip() for name in names], list(values.T)
+    columns = dict(zip(names, arrays, strict=True))
+    if twice := [name for name in columns if names.count(name) > 1]:
+        raise ValueError(f"{path}: column {twice[0]!r}: must stand there once")
     if "time" not in columns or not len(columns["time"]):
         raise ValueError(f"{path}: must have a column 'time', with at least one row; it has {', '.join(columns)}")
+    if not set(SHOWN) & set(columns):
+        raise ValueError(f"{path}: must have a column of a result beside the time; it has {', '.join(columns)}")
+    _check_times(path, columns["time"])
     return columns
+
+
+def _check_times(path: Path, times: NDArray[np.float64]) -> None:
+    for i, time in enumerate(times.tolist()):
+        if not math.isfinite(time):
+            raise ValueError(f"{path}: time = {time!r} in row {i + 1}: must be a finite number")
+        if i and time < times[i - 1]:
+            raise ValueError(f"{path}: time = {time!r} in row {i + 1}: must not go back; before it is {times[i - 1]}")
 
 
 def differences(result: Result, stored: Mapping[str, NDArray[np.float64]]) -> list[Difference]:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from ..fmu.interface import BY_NAME, INPUTS, VARIABLES
+from ..fmu.interface import BY_NAME, INPUTS, STATES, VARIABLES
 from ..fmu.near_names import beside, did_you_mean
 from ..scenes import Signals
 
@@ -38,6 +38,10 @@ class ControlLog(NamedTuple):
     table: Signals
     cut: bool
     """Whether it is the record of a drive whose end is missing."""
+    unused: tuple[str, ...] = ()
+    """Columns of outputs and local variables, which are passed over."""
+    begins: tuple[tuple[str, float], ...] = ()
+    """Of these the states, as they are in the first row."""
 
 
 class Line(NamedTuple):
@@ -77,15 +81,18 @@ def read_control_log(path: str | os.PathLike[str]) -> ControlLog:
         raise ValueError(f"{source}: must have a header and at least one row of numbers")
     while not header.cells[-1]:  # a separator at the end of the line
         header.cells.pop()
-    names = _names(source, header)
+    places = _places(source, header)
+    names = {name: place for name, place in places.items() if name == TIME or name in INPUTS}
     _check_lengths(source, len(header.cells), rows)
-    columns = {name: _numbers(source, name, i, rows) for i, name in names.items()}
+    columns = {name: _numbers(source, name, i, rows) for name, i in names.items()}
     _check_order(source, columns[TIME], rows)
     order = (TIME, *(name for name in columns if name != TIME))
     table = np.empty(len(rows), dtype=[(name, np.float64) for name in order])
     for name in order:
         table[name] = columns[name]
-    return ControlLog(table, cut)
+    first = [(name, rows[0].cells[places[name]]) for name in STATES if name in places]
+    begins = tuple((name, float(cell)) for name, cell in first if NUMBER.fullmatch(cell))
+    return ControlLog(table, cut, tuple(name for name in places if name not in names), begins)
 
 
 def _text(source: Path) -> str:
@@ -119,9 +126,9 @@ def _lines(source: Path, text: str) -> Iterator[Line]:
             yield Line(number, cells)
 
 
-def _names(source: Path, header: Line) -> dict[int, str]:
-    """Place -> name of the columns to be read."""
-    names: dict[int, str] = {}
+def _places(source: Path, header: Line) -> dict[str, int]:
+    """Name -> place of the columns."""
+    places: dict[str, int] = {}
     known = {each.lower(): each for each in (TIME, *SHOWN)}
     for i, cell in enumerate(header.cells):
         found = NAME.fullmatch(cell)
@@ -132,13 +139,12 @@ def _names(source: Path, header: Line) -> dict[int, str]:
         unit = "s" if name == TIME else BY_NAME[name].unit or ""
         if found and found["unit"] not in (None, unit) and (name == TIME or name in INPUTS):
             _refuse(source, header.number, f"column {cell!r}: must be in {unit!r}")
-        if name in names.values():
+        if name in places:
             _refuse(source, header.number, f"column {cell!r}: must stand there once")
-        if name == TIME or name in INPUTS:
-            names[i] = name
-    if TIME not in names.values():
+        places[name] = i
+    if TIME not in places:
         _refuse(source, header.number, "there must be a column 'time'")
-    return names
+    return places
 
 
 def _check_lengths(source: Path, width: int, rows: Sequence[Line]) -> None:

@@ -80,6 +80,10 @@ class Run:
     """Inputs that hold their start value: nothing was said of them."""
     cut: bool = False
     """Whether the inputs are the record of a drive whose end is missing."""
+    unused: tuple[str, ...] = ()
+    """Columns of the inputs' file that are passed over."""
+    begins: tuple[tuple[str, float], ...] = ()
+    """The states in its first row, where it has them."""
 
     def on(self, own: Mapping[str, float | int]) -> "Run":
         """The same on an FMU with start values of its own: they hold where the run sets nothing else."""
@@ -162,6 +166,8 @@ def plan(
         communication_step=default_step if communication_step is None else communication_step,
         held=tuple(name for name in INPUTS if name not in (table.dtype.names or ()) and name not in values),
         cut=log.cut,
+        unused=log.unused,
+        begins=log.begins if start_time in (None, first) else (),
     )
     _check_times(run)
     return run

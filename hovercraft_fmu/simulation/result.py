@@ -144,7 +144,8 @@ class Result:
         return frame
 
     def write_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write all columns as CSV, with all digits; as inputs of a run the file gives the same motion again.
+        """Write all columns as CSV, with all digits; as inputs of a run with the same preset, start values and
+        communication step the file gives the same motion again.
 
         So it has the rows of `whole`. Raises OSError where it cannot be written.
         """
