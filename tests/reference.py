@@ -46,10 +46,12 @@ def reference_loads(
         distance = 0.5 * half * (point + 1.0)
         strip = pressure * craft["height"] * (yaw_rate * distance) * abs(yaw_rate * distance)
         moment -= craft["rotational_drag"] * 2.0 * distance * strip * 0.5 * half * weight
-    force_size = float(np.linalg.norm(drag) + np.linalg.norm(thrust) + np.linalg.norm(port) + np.linalg.norm(star))
+    outside, turn = np.array(controls[5:7]), controls[7]
+    parts = drag, thrust, port, star, outside
+    force_size = float(sum(np.linalg.norm(part) for part in parts))
     lever = craft["length"] + craft["width"]
     spin_size = pressure * craft["height"] * craft["length"] ** 4 * yaw_rate**2
-    return drag + thrust + port + star, moment, force_size, lever * force_size + spin_size
+    return sum(parts, np.zeros(2)), moment + turn, force_size, lever * force_size + spin_size + abs(turn)
 
 
 def seen_area(craft: Mapping[str, float], direction: Vector, at: Callable[[float, float], Vector]) -> float:

@@ -561,7 +561,7 @@ def test_two_sweeps_cannot_share_a_folder(tmp_path: Path) -> None:
     sweep(MASSES, engine="batch", workers=1, output=tmp_path, tell=try_another)
     code = f"""
 import os, signal
-from hovercraft_fmu.sweep import sweep
+from hovercraft_fmu.sweeps import sweep
 sweep({MASSES}, engine="batch", workers=1, output={str(tmp_path / "killed")!r},
       tell=lambda runs: os.kill(os.getpid(), signal.SIGKILL) if runs else None)
 """
