@@ -5,21 +5,21 @@
 
 #include "fleet.c"
 
-enum { MOST = 19, COLUMNS = FLEET_STATES + 2 * FLEET_CONTROLS + FLEET_CONSTANTS + 4 };
+enum { MANY = 19, CRAFT = FLEET_STATES + 2 * FLEET_CONTROLS, COLUMNS = CRAFT + FLEET_CONSTANTS + 4 };
 
-static double given[COLUMNS][MOST];
+static double given[COLUMNS][MANY];
 
 static struct column column_of(int k, int64_t first, int strides)
 {
     return (struct column){&given[k][strides >> k % 31 & 1 ? first : 0], strides >> k % 31 & 1};
 }
 
-static int64_t advanced(int64_t first, int64_t count, int strides, int method, int missing, double ends[FLEET_STATES][MOST],
+static int64_t advanced(int64_t first, int64_t count, int strides, int method, int missing, double ends[FLEET_STATES][MANY],
                         int32_t *why)
 {
-    static double reals[5][MOST];
-    static int64_t counts[MOST];
-    static int32_t parts[MOST];
+    static double reals[5][MANY];
+    static int64_t counts[MANY];
+    static int32_t parts[MANY];
     struct fleet fleet = {.count = count};
     struct way way = {.integrator = method};
     struct reached reached = {.substeps = counts, .stability = reals[0], .rotation = reals[1], .proposed = reals[2],
@@ -59,31 +59,32 @@ static int64_t advanced(int64_t first, int64_t count, int strides, int method, i
 static void bound(int method)
 {
     double *steps = given[COLUMNS - 4], *sizes = given[COLUMNS - 3];
-    for (int i = 0; i < MOST; i++)
-        for (int j = 0; j < MOST; j++)
+    for (int i = 0; i < MANY; i++)
+        for (int j = 0; j < MANY; j++)
             if (method == ADAPTIVE ? steps[i] > 1e-9 : steps[i] > 1e3 * sizes[j] && steps[i] <= 2e9 * sizes[j])
                 steps[i] = method == ADAPTIVE ? 1e-9 : 1e3 * sizes[j];
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static const double usual[COLUMNS] = {[2] = 1.0,   [3] = 0.3,    [6] = 5.0,       [16] = 100.0, [17] = 500.0,
-                                          [18] = 20.0, [19] = 10.0,  [20] = 5.0,      [21] = 1.25,  [22] = 1.225,
-                                          [23] = -.25, [24] = 3.0,   [26] = 10.0,     [27] = 1.0,   [29] = 9.8,
-                                          [31] = 0.3,  [32] = 0.01,  [33] = 1e-6};
-    static double ends[FLEET_STATES][MOST], alone[FLEET_STATES][MOST];
-    static int32_t why[MOST], own[MOST];
+    static const double usual[COLUMNS] = {
+        [2] = 1.0, [3] = 0.3, [6] = 5.0, [CRAFT] = 100.0, [CRAFT + 1] = 500.0, [CRAFT + 2] = 20.0, [CRAFT + 3] = 10.0,
+        [CRAFT + 4] = 5.0, [CRAFT + 5] = 1.25, [CRAFT + 6] = 1.225, [CRAFT + 7] = -.25, [CRAFT + 8] = 3.0,
+        [CRAFT + 10] = 10.0, [CRAFT + 11] = 1.0, [CRAFT + 13] = 9.8, [COLUMNS - 4] = 0.3, [COLUMNS - 3] = 0.01,
+        [COLUMNS - 2] = 1e-6};
+    static double ends[FLEET_STATES][MANY], alone[FLEET_STATES][MANY];
+    static int32_t why[MANY], own[MANY];
     int strides;
     if (size < 8)
         return 0;
-    const int64_t count = data[0] % (MOST + 2) - 1;
-    const int method = data[1] % 6, missing = data[2] % 16 < 8 ? 0 : data[2] % 8;
+    const int64_t count = data[0] % (MANY + 2) - 1;
+    const int method = data[1] % 7, missing = data[2] % 16 < 8 ? 0 : data[2] % 8;
     memcpy(&strides, data + 3, sizeof strides);
     for (int k = 0; k < COLUMNS; k++)
-        for (int i = 0; i < MOST; i++)
+        for (int i = 0; i < MANY; i++)
             given[k][i] = usual[k];
     for (size_t at = 8; at + 10 <= size; at += 10)
-        memcpy(&given[data[at] % COLUMNS][data[at + 1] % MOST], data + at + 2, sizeof(double));
+        memcpy(&given[data[at] % COLUMNS][data[at + 1] % MANY], data + at + 2, sizeof(double));
     bound(method);
     if (advanced(0, count, strides, method, missing, ends, why) < 0)
         return 0;
