@@ -35,7 +35,10 @@ def written(path: Path) -> Iterator[Path]:
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not target.is_file() and not target.is_dir():
-        yield path
+        try:
+            yield path
+        except OSError as error:
+            raise OSError(error.errno, error.strerror or str(error), str(path)) from error
         return
     unfinished = target.with_name(f".{target.name}.{os.getpid()}")
     _unfinished.add(unfinished)

@@ -420,3 +420,15 @@ def test_the_measurements_are_listed_with_what_they_take(shell: Shell) -> None:
     printed = shell.ok("measure", "--help")
     for name, each in MEASUREMENTS.items():
         assert re.search(rf"^ +{name} .*\({each.takes}\)$", printed, re.MULTILINE)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full: not on this system")
+@pytest.mark.usefixtures("native_at_hand")
+def test_what_is_full_is_named(shell: Shell) -> None:
+    (shell.folder / "full.csv").symlink_to("/dev/full")
+    refused = shell.refused("simulate", "--stop-time", "1", "--output", "full.csv")
+    assert refused == "hovercraft-fmu: full.csv: No space left on device\n"
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "hovercraft_fmu", "simulate", "--list-scenes"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (1, "hovercraft-fmu: standard output: No space left on device\n")

@@ -22,8 +22,28 @@ NARROW = 16
 """Characters: a column is not folded to less."""
 WIDE = 160
 """Characters of a line where nobody says how wide it may be."""
+
+
+@contextmanager
+def _to_standard_output() -> Iterator[None]:
+    """What cannot be written there says where that is."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "standard output") from error
+
+
+class StandardOutput(Console):
+    """Raises OSError, which names it, where it is full."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """As it is there."""
+        with _to_standard_output():
+            super().print(*objects, **options)
+
+
 _is_told = sys.stdout.isatty() or "COLUMNS" in os.environ
-OUTPUT = Console(soft_wrap=True, highlight=False, markup=False, width=None if _is_told else WIDE)
+OUTPUT = StandardOutput(soft_wrap=True, highlight=False, markup=False, width=None if _is_told else WIDE)
 """All that is printed is meant as it stands: pip install 'hovercraft-fmu[plot]' is no markup."""
 LINE_EVERY = 10.0
 """s: of progress, where it is not shown on a terminal."""
@@ -64,7 +84,9 @@ json_option = click.option(
 
 def print_json(result: Any) -> None:
     """For programs: SI units, angles in radians; what is no number is null."""
-    click.echo(json.dumps(_finite(result), indent=2, default=str, allow_nan=False))
+    text = json.dumps(_finite(result), indent=2, default=str, allow_nan=False)
+    with _to_standard_output():
+        click.echo(text)
 
 
 def _finite(value: Any) -> Any:
