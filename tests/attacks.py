@@ -1,5 +1,6 @@
 """Attacks in Python: what `python -m tests.fuzz` has beside libFuzzer's; each returns what it did, in words."""
 
+import hashlib
 import io
 import math
 import os
@@ -26,6 +27,7 @@ from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import INTEGRATORS, StepTooSmallError, Stretch
 from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance
+from hovercraft_fmu.sweeps import load, store, sweep
 from tests.native import C_TESTS, Kernel, compile_c
 
 WHOLE_RANGE, MODERATE = 308.0, 2.0
@@ -308,10 +310,60 @@ def _mangled(dice: random.Random, content: bytes) -> bytes:
     return bytes(spoiled)
 
 
+def chunks(runs: int, seed: int = 1) -> str:
+    """The files of a sweep spoiled at random places, half of them with the right checksum again: named, set aside and
+    made anew, so that the sweep is what it was; only what was sealed again may be taken for one.
+    """
+    dice, ended = random.Random(seed), Counter[str]()
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        sweep(CHUNKED, engine="batch", workers=1, output=folder)
+        paths = sorted(folder.glob("*/*.parquet"))
+        good, whole = {path: path.read_bytes() for path in paths}, load(folder)
+        for _ in range(runs):
+            path, sealed = dice.choice(paths), dice.random() < 0.5
+            bad = _mangled(dice, good[path])
+            bad = _sealed(bad) if sealed else bad
+            if bad == good[path]:
+                continue
+            path.write_bytes(bad)
+            taken, said = False, ""
+            try:
+                taken = not sweep(CHUNKED, engine="batch", workers=1, output=folder).spoiled
+                there = load(folder)
+                assert taken or there == whole
+            except ValueError as error:
+                taken, said = False, str(error)
+            assert not said or said.startswith(str(folder)), said  # as another sweep's, or as a file that is none
+            assert sealed or not taken, path
+            ended["taken" if taken else "set aside"] += 1
+            for each, content in good.items():
+                each.write_bytes(content)
+    return f"{runs} files: {', '.join(f'{count} {how}' for how, count in ended.items())}"
+
+
+def _sealed(content: bytes) -> bytes:
+    """With the checksum of what it is now, where it still has one."""
+    for seal in set(store.SEAL.findall(content)):
+        content = content.replace(seal, store.BLANK)
+        content = content.replace(store.BLANK, hashlib.sha256(content).hexdigest().encode())
+    return content
+
+
+CHUNKED: dict[str, Any] = {
+    "scene": "turn",
+    "stop_time": 1.0,
+    "set": {"step_size": 0.1},
+    "keep": {"end": ["speed"], "trajectory": {"every": 0.5, "of": ["speed"]}},
+    "sweep": {"mass": [60.0, 100.0]},
+}
+
+
 ATTACKS = {
     "extremes": (extremes, 20_000),
     "standards": (standards, 3_000),
     "signals": (signals, 120),
     "files": (files, 300),
+    "chunks": (chunks, 300),
 }
 """Name -> the attack, and how often by default."""

@@ -1,6 +1,7 @@
-"""python -m tests.fuzz ATTACK [N]: calls, extremes, standards, signals, files.
+"""python -m tests.fuzz ATTACK [N]: calls, valgrind, extremes, standards, signals, files, chunks.
 
-calls: any sequence of FMI calls on sanitized native FMUs, N seconds (600) each; the others are in attacks.py, N times.
+calls: any sequence of FMI calls on sanitized native FMUs, by hostile hosts too, N seconds (600) each; valgrind: the
+same of random bytes, N sequences (400) each; the others are in attacks.py, N times.
 """
 
 import os
@@ -21,8 +22,10 @@ SHORT, LONG = ("-O0", *SANITIZE), ("-O1", *SANITIZE)
 """To optimize takes five times as long as to compile, and makes a run three times as fast."""
 DEMANDS_ALONE = ("-O1", "-fsanitize=fuzzer")
 """For what fuzz.c itself demands: three times as fast again."""
+WITH_A_MAIN = ("-O1", "-gdwarf-4", "-DALONE")
 DEFAULT = 600
 """s"""
+SEQUENCES = 400
 BLOCK, BLOCK_TO_WRITE = "static const struct variant VARIANT", "__attribute__((weak)) struct variant VARIANT"
 """What a library says of itself: here the fuzzer writes into it, as whoever has the file can."""
 
@@ -46,10 +49,10 @@ def compiled(folder: Path, flavour: Flavour = NATIVE, options: tuple[str, ...] =
     header.write_text(text.replace(BLOCK, BLOCK_TO_WRITE), encoding="utf-8")
     command = ["clang", "-std=c11", "-Wall", "-Wextra", "-ffp-contract=off", *options, f"-DFMI={flavour.fmi}",
                f'-DFUZZED="fuzz_{folder_of(flavour)}.h"',
-               f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX", "-I", str(folder), *C_INCLUDES,
-               str(folder / flavour.unit), str(C_TESTS / "fuzz.c"), "-o", str(program)]  # fmt: skip
+               f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX", "-I", str(folder), *C_INCLUDES, "-Wl,--wrap=calloc",
+               str(folder / flavour.unit), str(C_TESTS / "fuzz.c"), "-lm", "-o", str(program)]  # fmt: skip
     built = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (built.returncode, built.stderr) == (0, "")
+    assert (built.returncode, built.stderr) == (0, ""), built.stderr
     return program
 
 
@@ -75,8 +78,23 @@ def calls(seconds: int) -> str:
     return "\n".join(said)
 
 
+def valgrind(sequences: int) -> str:
+    """Random sequences: nothing is read before it is written, which no sanitizer of `calls` sees; nothing is left."""
+    for name in ("clang", "valgrind"):
+        if not shutil.which(name):
+            sys.exit(f"no {name}: apt-get install {name}")
+    for each in NATIVE_FLAVOURS:
+        with tempfile.TemporaryDirectory() as place:
+            program = compiled(written_sources(Path(place), each), each, WITH_A_MAIN)
+            command = ["valgrind", "-q", "--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=all",
+                       str(program), str(sequences)]  # fmt: skip
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert (done.returncode, done.stderr) == (0, ""), done.stderr[-20000:]
+    return f"{sequences} sequences on each of {len(NATIVE_FLAVOURS)} FMUs: nothing"
+
+
 if __name__ == "__main__":
-    table = {"calls": (calls, DEFAULT), **attacks.ATTACKS}
+    table = {"calls": (calls, DEFAULT), "valgrind": (valgrind, SEQUENCES), **attacks.ATTACKS}
     name = sys.argv[1] if len(sys.argv) > 1 else ""
     if name not in table:
         sys.exit(f"attack = {name!r}: must be one of {', '.join(table)}")

@@ -17,7 +17,7 @@ def test_many_sequences_without_a_finding(flavour: Flavour, tmp_path: Path) -> N
     if missing := fuzz.missing():
         pytest.skip(missing)
     program = fuzz.compiled(written_sources(tmp_path, flavour), flavour)
-    runs = 6000 if flavour.exchange else 2000  # the less there is to call, the sooner it has been
+    runs = 4000 if flavour.exchange else 1500  # the less there is to call, the sooner it has been
     assert f"number_of_executed_units: {runs}" in fuzz.fuzz(program, f"-runs={runs}")
 
 
@@ -35,15 +35,31 @@ SPOILED = {
         "    const struct controls controls = to_come ? inputs_of(now) : m->controls;\n",
         "    if (now->phase == INITIALIZING && n_unknowns > 0)\n        instance->now.time += 1.0;\n",
     ),
+    "messages.c": ("    instance->telling = true;\n", "        instance->telling = false;\n"),
+    "instance.c": (
+        "        *state = services->allocate(services->sink, sizeof *content);\n",
+        "        instance_come_back(instance, inside);\n        if (!*state)\n            return FINE;\n",
+    ),
+    "instance.h": (
+        "    instance->host = environment_enter();\n",
+        "        environment_leave(&instance->host);\n",
+    ),
     "variant.c": (
         "    const struct variant *v = variant();\n",
         "    if (v->size == sizeof *v)\n        return FINE;\n",
     ),
 }
 """File: a line before inputs, states, or derivatives over a parameter are all checked, and one that sets some there; or
-before the start values in the library are, and one that takes them."""
+before the start values in the library are, and one that takes them; where a logger may not call back, memory may be
+missing, or rounding is the instance's own, and one that forgets that."""
+OF_HOSTILE_HOSTS = ("messages.c", "instance.c", "instance.h")
 FOUND = "fuzz: a refused call changed something"
-FINDINGS = {"variant.c": "damaged start values were taken|runtime error"}
+FINDINGS = {
+    "messages.c": "fuzz: a call from inside the logger was taken|fuzz: the logger was called from inside the logger",
+    "instance.c": "fuzz: there was no memory for a call",
+    "instance.h": "fuzz: the host's rounding changed a bit",
+    "variant.c": "damaged start values were taken|runtime error",
+}
 
 
 def test_it_would_find_a_refused_call_that_changes_something(tmp_path: Path) -> None:
@@ -59,5 +75,6 @@ def test_it_would_find_a_refused_call_that_changes_something(tmp_path: Path) -> 
         (tmp_path / file).write_text(includes + text.replace(check, check + chosen), encoding="utf-8")
     program = fuzz.compiled(tmp_path, options=fuzz.DEMANDS_ALONE)
     for file in SPOILED:
+        calm = {} if file in OF_HOSTILE_HOSTS else {"CALM": "1"}
         with pytest.raises(AssertionError, match=FINDINGS.get(file, FOUND)):
-            fuzz.fuzz(program, "-runs=1000000", SPOILED=file)  # it ends when it has found it, everywhere at the same
+            fuzz.fuzz(program, "-runs=1000000", SPOILED=file, **calm)  # until it has found it

@@ -152,7 +152,11 @@ def _opened(path: Path) -> tuple[dict[str, Any], bytes]:
     (seal,) = seals
     if hashlib.sha256(content.replace(seal, BLANK)).hexdigest().encode() != seal:
         raise ValueError("is damaged: its checksum is another one")
-    about = dict(json.loads(pq.read_schema(pa.BufferReader(content)).metadata[KEY]))
+    try:  # whoever can work out a checksum may still have written anything
+        about = dict(json.loads(pq.read_schema(pa.BufferReader(content)).metadata[KEY]))
+        int(about["number"]), str(about["what"])
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise ValueError("is none that a sweep wrote") from error
     return about, content
 
 
@@ -185,10 +189,17 @@ def load(folder: str | os.PathLike[str], what: str = RUNS) -> pa.Table:
     tables = []
     for path in files:
         there, content = _checked(folder / what / path.name, about)
-        tables.append(pq.read_table(io.BytesIO(content)).replace_schema_metadata(None))
+        tables.append(_table(path, content))
         assert tables[-1].num_rows == there["rows"]
     shared = {name: value for name, value in about.items() if name not in OF_ONE_FILE}
     return pa.concat_tables(tables).replace_schema_metadata({KEY: json.dumps(shared)})
+
+
+def _table(path: Path, content: bytes) -> pa.Table:
+    try:
+        return pq.read_table(io.BytesIO(content)).replace_schema_metadata(None)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: is none that a sweep wrote: remove it; the same command makes it anew") from error
 
 
 def _checked(path: Path, about: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:

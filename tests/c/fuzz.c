@@ -2,8 +2,14 @@
    What differs in the standards is in fuzz_fmi2.h and, with -DFMI=3, in fuzz_fmi3.h; in models, in fuzz_MODEL.h.
 
    Beside what the sanitizers see it demands that only the statuses of the standard that this FMU has come back, that a
-   refused call changes nothing, and that what is read is finite. */
+   refused call changes nothing, and that what is read is finite.
 
+   The host of a sequence may be a hostile one: it has no memory now and then, and is told so (linked with
+   -Wl,--wrap=calloc); it rounds otherwise, which changes no bit, and is left to it; its logger calls back, which is
+   refused, and frees, which does nothing; with CALM in the environment it never is. With -DALONE it has a main of its
+   own: so many sequences of random bytes. */
+
+#include <fenv.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -23,6 +29,7 @@ struct bytes {
 
 struct world {
     void *craft[INSTANCES];
+    int listens[INSTANCES]; /* to errors, for sure */
     void *saved[SLOTS];
     char blob[BLOB];
     size_t blob_size;
@@ -30,6 +37,29 @@ struct world {
 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__wrap_calloc(size_t count, size_t size);
+
+/* What the host of a sequence is like. */
+struct host_kind {
+    int rounding;     /* one of fenv.h's */
+    int calls_back;   /* its logger does */
+    unsigned without; /* bit n: of 16 allocations the n-th fails */
+    int compared;     /* the sequence is made again, by one who rounds otherwise */
+};
+
+/* And what it does at the moment. */
+static struct {
+    struct host_kind is;
+    void *craft;           /* whose call is made; NULL: nobody's, or of one that is not yet the host's */
+    struct bytes *bytes;   /* inside a step and in the logger: what it does there */
+    int is_making_a_call;
+    int is_told;           /* its logger is at work */
+    unsigned allocations;
+    unsigned failed;       /* of them */
+    unsigned told_of_none; /* that there is no memory */
+    uint64_t hash;         /* of all that comes of the calls, where it is compared */
+} host;
 
 static void demand(int good, const char *what)
 {
@@ -39,8 +69,43 @@ static void demand(int good, const char *what)
     }
 }
 
+void *__wrap_calloc(size_t count, size_t size)
+{
+    if (host.is_making_a_call && host.is.without >> host.allocations++ % 16 & 1) {
+        host.failed++;
+        return NULL;
+    }
+    return __real_calloc(count, size);
+}
+
+static unsigned a_byte(struct bytes *bytes);
+
+/* From inside the logger. */
+static void call_back(void *craft, unsigned how)
+{
+    static const unsigned reference = 0;
+    void *state = NULL;
+    double value = 1.0;
+    const int statuses[] = {call_get(craft, &reference, 1, &value), call_set(craft, &reference, 1, &value),
+                            call_step(craft, 0.0, 0.01),            call_save(craft, &state),
+                            call_reset(craft),                      call_go(craft),
+                            call_set_time(craft, 1.0),              call_get(craft, NULL, 1, NULL)};
+    for (size_t i = 0; i < sizeof statuses / sizeof *statuses; i++)
+        demand(statuses[i] == CALL_REFUSED && !state && value == 1.0, "a call from inside the logger was taken");
+    if (how & 1)
+        call_free(craft);
+}
+
 static void heard(int status, const char *message)
 {
+    demand(!host.is_told, "the logger was called from inside the logger");
+    demand(fegetround() == host.is.rounding, "the logger has another rounding");
+    host.is_told = 1;
+    host.told_of_none += strstr(message, "no memory") != NULL;
+    host.hash = checksum(host.hash, message, strlen(message));
+    if (host.is.calls_back && host.craft)
+        call_back(host.craft, a_byte(host.bytes));
+    host.is_told = 0;
     demand(status >= CALL_WARNED && status <= CALL_REFUSED, "a message of another status");
     demand(strlen(message) > 0 && !strchr(message, '%'), "a message that is empty, or a format");
 }
@@ -96,12 +161,6 @@ static int an_integer(struct bytes *bytes)
     return value;
 }
 
-/* The craft whose step is being made: inside it, the host may be asked for inputs. */
-static struct {
-    void *craft;
-    struct bytes *bytes;
-} stepping;
-
 static double real_of(void *craft, unsigned reference)
 {
     double value = NAN;
@@ -138,10 +197,14 @@ static void spoil_variant(struct bytes *bytes)
 
 /* Half of them are past their start already; in continuous-time mode, where they are for that. Of the others half are
    in initialization mode. Start values of one's own may contradict one another: that is said when it starts. */
-static void *started(struct bytes *bytes, const struct variant *ours)
+static void *started(struct bytes *bytes, const struct variant *ours, int *listens)
 {
-    void *craft = made(bytes);
+    const unsigned failed = host.failed, told = host.told_of_none;
+    void *craft = made(bytes, listens);
+    demand(host.failed == failed || (!craft && host.told_of_none == told + (*listens != 0)),
+           "there was no memory for an instance");
     const unsigned how = craft ? a_byte(bytes) : 0;
+    host.craft = craft;
     demand(!craft || VARIANT.checksum == checksum(CHECKSUM_OF_NOTHING, &VARIANT, SUMMED),
            "damaged start values were taken");
     if (how & 3)
@@ -156,9 +219,7 @@ static void *started(struct bytes *bytes, const struct variant *ours)
 /* A step that does not take long. */
 static int step(void *craft, struct bytes *bytes)
 {
-    double size = a_double(bytes);
-    stepping.craft = craft;
-    stepping.bytes = bytes;
+    const double size = a_double(bytes);
     const double point = a_byte(bytes) < 240 ? time_of(craft) : a_double(bytes);
     return limited_step(craft, point, size);
 }
@@ -292,6 +353,7 @@ static int called(struct bytes *bytes, struct world *world, void **craft)
         *craft = NULL;
         return CALL_OK;
     case 8:
+        world->listens[craft - world->craft] = 0;
         return logging(*craft, bytes);
     case 9:
         return others(*craft, bytes);
@@ -328,36 +390,90 @@ static size_t whole(void *craft, char into[BLOB])
 {
     void *state = NULL;
     size_t size = 0;
+    host.is_making_a_call = 0;
     real_of(craft, WORKED_OUT);
     demand(call_save(craft, &state) == CALL_OK && call_size(craft, state, &size) == CALL_OK &&
                size <= BLOB && call_serialize(craft, state, into, size) == CALL_OK,
            "a state must always be there");
     call_forget(craft, &state);
+    if (host.is.compared)
+        host.hash = checksum(host.hash, into, size);
+    host.is_making_a_call = 1;
     return size;
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+static void one_call(struct bytes *bytes, struct world *world, void **craft)
 {
-    struct bytes bytes = {data, size};
+    char before[BLOB], after[BLOB];
+    host.craft = *craft;
+    const size_t n = whole(*craft, before);
+    const unsigned failed = host.failed, told = host.told_of_none;
+    const unsigned listens = world->listens[craft - world->craft] != 0;
+    const int status = called(bytes, world, craft);
+    demand(status >= CALL_OK && status <= CALL_REFUSED, "a status that never comes");
+    demand(host.failed == failed || (status == CALL_REFUSED && host.told_of_none >= told + listens),
+           "there was no memory for a call");
+    demand(fegetround() == host.is.rounding, "the host has another rounding");
+    if (status >= CALL_DISCARDED)
+        demand(whole(*craft, after) == n && memcmp(before, after, n) == 0, "a refused call changed something");
+}
+
+/* Returns the hash of all that came of it. */
+static uint64_t sequence(struct bytes bytes, struct host_kind kind)
+{
     struct world world = {.blob_size = 0};
     const struct variant ours = VARIANT;
+    memset(&host, 0, sizeof host);
+    host.is = kind, host.bytes = &bytes;
     call_tell = heard;
     spoil_variant(&bytes);
+    fesetround(kind.rounding);
+    host.is_making_a_call = 1;
     while (bytes.left > 0) {
-        void **craft = &world.craft[a_byte(&bytes) % INSTANCES];
-        char before[BLOB], after[BLOB];
-        if (!*craft && !(*craft = started(&bytes, &ours)))
-            continue;
-        const size_t n = whole(*craft, before);
-        const int status = called(&bytes, &world, craft);
-        demand(status >= CALL_OK && status <= CALL_REFUSED, "a status that never comes");
-        if (status >= CALL_DISCARDED)
-            demand(whole(*craft, after) == n && memcmp(before, after, n) == 0, "a refused call changed something");
+        const unsigned i = a_byte(&bytes) % INSTANCES;
+        host.craft = NULL;
+        if (world.craft[i] || (world.craft[i] = started(&bytes, &ours, &world.listens[i])))
+            one_call(&bytes, &world, &world.craft[i]);
     }
+    host.is_making_a_call = 0;
+    fesetround(FE_TONEAREST);
     for (int i = 0; i < SLOTS; i++)
         free(world.saved[i]); /* the hosts' own memory, with or without callbacks */
     for (int i = 0; i < INSTANCES; i++)
         call_free(world.craft[i]);
     VARIANT = ours;
+    return host.hash;
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static const int roundings[] = {FE_TONEAREST, FE_DOWNWARD, FE_UPWARD, FE_TOWARDZERO};
+    struct bytes bytes = {data, size};
+    const unsigned how = getenv("CALM") ? 0 : a_byte(&bytes);
+    const int rounding = roundings[how % 16 < 12 ? 0 : how % 4];
+    struct host_kind kind = {.rounding = FE_TONEAREST, .calls_back = how & 16, .compared = rounding != FE_TONEAREST};
+    if (how & 32)
+        kind.without = a_byte(&bytes) << 8 | a_byte(&bytes);
+    const uint64_t hash = sequence(bytes, kind);
+    kind.rounding = rounding;
+    demand(!kind.compared || sequence(bytes, kind) == hash, "the host's rounding changed a bit");
     return 0;
 }
+
+#ifdef ALONE
+
+int main(int argc, char **argv)
+{
+    static uint8_t data[400];
+    uint64_t dice = 88172645463325252u;
+    for (int left = argc > 1 ? atoi(argv[1]) : 1; left > 0; left--) {
+        for (size_t i = 0; i < sizeof data; i++) {
+            dice ^= dice << 13, dice ^= dice >> 7, dice ^= dice << 17;
+            data[i] = (uint8_t)(dice >> 32);
+        }
+        LLVMFuzzerTestOneInput(data, sizeof data);
+    }
+    return 0;
+}
+
+#endif

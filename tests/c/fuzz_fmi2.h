@@ -7,10 +7,19 @@ static void logger(fmi2ComponentEnvironment environment, fmi2String instance, fm
     heard(status, message);
 }
 
-static void *made(struct bytes *bytes)
+/* The FMU says canNotUseMemoryManagementFunctions. */
+static void *no_memory_of_the_hosts(size_t count, size_t size)
 {
-    static const fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
+    (void)count, (void)size;
+    demand(0, "the host was asked for memory");
+    return NULL;
+}
+
+static void *made(struct bytes *bytes, int *listens)
+{
+    static const fmi2CallbackFunctions callbacks = {logger, no_memory_of_the_hosts, free, NULL, NULL};
     const unsigned how = a_byte(bytes);
+    *listens = how & 2;
     char guid[16];
     take(bytes, guid, sizeof guid - 1);
     guid[sizeof guid - 1] = '\0';

@@ -4,29 +4,32 @@
 static void update(fmi3InstanceEnvironment environment, double time, bool set, bool get, bool finished, bool early,
                    bool *return_early, double *when)
 {
-    void *craft = stepping.craft, *state = NULL;
-    const unsigned how = a_byte(stepping.bytes), input = INPUTS[how % INPUT_COUNT];
+    void *craft = host.craft, *state = NULL;
+    const unsigned how = a_byte(host.bytes), input = INPUTS[how % INPUT_COUNT];
     (void)environment, (void)return_early, (void)when;
+    demand(fegetround() == host.is.rounding, "another rounding inside a step");
     demand(isfinite(time) && set && !get && !finished && !early, "the flags inside a step");
     if (how < 64)
         return;
     if (how < 250) {
-        const double value = a_double(stepping.bytes);
+        const double value = a_double(host.bytes);
         demand(call_set(craft, &input, 1, &value) == (isfinite(value) ? CALL_OK : CALL_REFUSED), "an input in a step");
         return;
     }
     demand(call_step(craft, time, 0.1) == CALL_REFUSED && call_terminate(craft) == CALL_REFUSED &&
                call_reset(craft) == CALL_REFUSED && call_save(craft, &state) == CALL_REFUSED,
            "a call that must not be made inside a step");
+    call_free(craft);
 }
 
-static void *made(struct bytes *bytes)
+static void *made(struct bytes *bytes, int *listens)
 {
     static const unsigned reference = 0; /* an input */
     const unsigned how = a_byte(bytes);
     const fmi3LogMessageCallback log = how & 2 ? call_log : NULL;
     const bool logging = how & 4;
     const char *name = how & 1 ? "craft" : NULL, *token = VARIANT.guid;
+    *listens = how & 2;
     char any[16];
     take(bytes, any, sizeof any - 1);
     any[sizeof any - 1] = '\0';

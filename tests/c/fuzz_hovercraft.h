@@ -14,15 +14,24 @@ static void some_references(struct bytes *bytes, unsigned unknowns[MOST], unsign
     }
 }
 
+/* Whatever the host's rounding: the fuzzer itself goes on in the same way. */
+static double quotient(double a, double b)
+{
+    fesetround(FE_TONEAREST);
+    const volatile double nearest = a / b;
+    fesetround(host.is.rounding);
+    return nearest;
+}
+
 /* A step that does not take long. */
 static int limited_step(void *craft, double point, double size)
 {
     if (integer_of(craft, V_INTEGRATOR) == ADAPTIVE || integer_of(craft, V_INTEGRATOR_NUMBER) == ADAPTIVE) {
         const double turn = real_of(craft, V_VELOCITY_YAW_RATE);
         if (size > 1e-4)
-            size = 1e-4 / (1.0 + (isfinite(turn) ? fabs(turn) : 0.0));
+            size = quotient(1e-4, isfinite(turn) ? fmax(1.0, 2.0 * fabs(turn)) : 1.0);
         return call_step(craft, point, size);
     }
-    const double n = size / real_of(craft, V_STEP_SIZE);
+    const double n = quotient(size, real_of(craft, V_STEP_SIZE));
     return n <= FEW_SUBSTEPS || n >= TOO_MANY ? call_step(craft, point, size) : CALL_OK;
 }

@@ -91,8 +91,12 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     static const fmi2CallbackFunctions none = {NULL, NULL, NULL, NULL, NULL};
     const size_t length = name ? strlen(name) : 0;
     struct component *c = memory_allocate(1, sizeof *c + length + 1);
-    if (!c)
+    if (!c) {
+        if (functions && functions->logger)
+            functions->logger(functions->componentEnvironment, name ? name : "", fmi2Error, "logStatusError",
+                              "fmi2Instantiate: no memory");
         return NULL;
+    }
     c->callbacks = functions ? *functions : none;
     memcpy(c->name, name ? name : "", length);
     c->name[length] = '\0';
@@ -107,7 +111,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 
 void fmi2FreeInstance(fmi2Component component)
 {
-    memory_release(component);
+    if (!instance_is_calling(component))
+        memory_release(component);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start_time,

@@ -90,8 +90,11 @@ static struct component *made(enum use use, fmi3String token, bool logging, fmi3
                               fmi3LogMessageCallback log)
 {
     struct component *c = memory_allocate(1, sizeof *c);
-    if (!c)
+    if (!c) {
+        if (log)
+            log(environment, fmi3Error, "logStatusError", "fmi3Instantiate: no memory");
         return NULL;
+    }
     const struct services services = {3, tell, allocate, release, NULL, c};
     c->environment = environment;
     c->log = log;
@@ -159,7 +162,8 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
 
 void fmi3FreeInstance(fmi3Instance instance)
 {
-    memory_release(instance);
+    if (!instance_is_calling(instance))
+        memory_release(instance);
 }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,

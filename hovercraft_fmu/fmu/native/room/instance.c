@@ -44,7 +44,7 @@ enum verdict instance_start(struct instance *instance, enum use use, const struc
     instance->call = NO_CALL;
     instance->refusal = REFUSED;
     instance->errors = 0;
-    instance->inside = false;
+    instance->inside = instance->telling = false;
     return variant_check(instance) == REFUSED ? REFUSED : instance_reset(instance);
 }
 

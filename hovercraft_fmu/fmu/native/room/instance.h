@@ -73,6 +73,7 @@ struct instance {
     uint64_t discarded;     /* what the step before was made of, if it was discarded; else 0 */
     struct environment host; /* its floating-point environment, while a call is inside */
     bool inside;
+    bool telling;           /* the host's logger is at work */
 };
 
 /* Around what a call computes. */
@@ -102,6 +103,12 @@ static inline void instance_come_back(struct instance *instance, bool inside)
 {
     if (inside)
         instance_enter(instance);
+}
+
+/* It has called the host, which has not come back: from inside that it must not be freed. */
+static inline bool instance_is_calling(const struct instance *instance)
+{
+    return instance && (instance->telling || instance->now.phase == INTERMEDIATE_UPDATE);
 }
 
 /* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. Refused: the

@@ -27,8 +27,10 @@ enum verdict instance_say(struct instance *instance, enum verdict verdict, const
     va_end(values);
     const struct services *services = &instance->services;
     const bool inside = instance_go_out(instance);
+    instance->telling = true;
     if (instance->logged >> verdict & 1)
         services->tell(services->sink, verdict, CATEGORIES[verdict], message);
+    instance->telling = false;
     instance_come_back(instance, inside);
     if (verdict == WARNED)
         return WARNED;

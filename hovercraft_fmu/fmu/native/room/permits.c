@@ -93,11 +93,19 @@ const char *call_name(const struct instance *instance, enum call call)
     return PERMITS[call].names[instance->services.fmi == 3];
 }
 
+/* From inside its logger it is not, without a word: what it tells of is half done, and to tell would call the logger. */
+static bool is_callable(const struct instance *instance)
+{
+    return instance && !instance->telling;
+}
+
 bool permitted_always(struct instance *instance, const char *name, bool given)
 {
-    if (instance && !given)
+    if (!is_callable(instance))
+        return false;
+    if (!given)
         instance_say(instance, REFUSED, "%s: no argument must be NULL", name);
-    return instance && given;
+    return given;
 }
 
 bool can_be_discarded(const struct instance *instance)
@@ -154,9 +162,10 @@ static void refuse_phase(struct instance *instance, const char *name, unsigned p
 bool permitted(struct instance *instance, enum call call, bool given)
 {
     const struct permit *permit = &PERMITS[call];
-    if (instance)
-        instance->call = call;
-    if (!instance || !permitted_always(instance, call_name(instance, call), given))
+    if (!is_callable(instance))
+        return false;
+    instance->call = call;
+    if (!permitted_always(instance, call_name(instance, call), given))
         return false;
     if (missing(call))
         instance_say(instance, REFUSED, "%s: must not be called: the model has no %s", call_name(instance, call),

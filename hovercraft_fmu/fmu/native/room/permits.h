@@ -58,7 +58,7 @@ enum call {
 };
 
 /* Whether a call may be made now; said, where not. `given`: no argument is NULL that must not be. Without an instance
-   it may not. */
+   it may not, nor from inside its logger. */
 HIDDEN bool permitted(struct instance *instance, enum call call, bool given);
 /* Of a call that is not in the table: it may be made in every state. */
 HIDDEN bool permitted_always(struct instance *instance, const char *name, bool given);
