@@ -1,5 +1,6 @@
 """The command demo: the whole way at once, and what to try next."""
 
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,8 +91,8 @@ def _demo_of_the_tow(fmu: Path, tether: Path, picture: Path) -> None:
         {
             "tension": f"{towed['tension'].max():.2f} N at most, {towed['tension'].mean():.2f} N in the mean",
             "line": f"{towed['distance'].max():.2f} m at most; below {towed.tow.line.slack_length:g} m it hangs loose",
-            "heading at the end": f"first {towed['first.pose.heading'][-1]:.2f} rad, "
-            f"second {towed['second.pose.heading'][-1]:.2f} rad",
+            "heading at the end": f"first {degrees(towed['first.pose.heading'][-1]):.2f} deg, "
+            f"second {degrees(towed['second.pose.heading'][-1]):.2f} deg",
         },
     )
     OUTPUT.print(f"wrote {towed.write_csv(picture.with_suffix('.csv'))}")

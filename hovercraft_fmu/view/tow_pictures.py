@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLORS = {"first": SEA, "second": SWAY}
-EVERY = 10.0
-"""s: between two places where the craft are drawn."""
+PLACES = 8
+"""Where the craft are drawn along their way, at most; they are a length of the craft apart at least."""
 FRAMES = 80
 """At most."""
 FRAME_TIME, LAST_FRAME_TIME = 75, 2000
@@ -41,17 +41,20 @@ def plot_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
     path = check_plot(path)
     figure = new_figure(figsize=(12.0, 6.75), dpi=120, layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
-    time, taut = towed["time"], towed["tension"] > 0.0
-    figure.suptitle(f"A tow on ice: the line pulls at {towed['tension'].max():.1f} N at most; it is taut for "
-                    f"{100 * taut.mean():.0f} % of {time[-1]:g} s")  # fmt: skip
+    time, pulls = towed["time"], int((towed["tension"] > 0.0).sum())
+    figure.suptitle(f"A tow on ice, {time[-1]:g} s: the line pulls at {towed['tension'].max():.1f} N at most, and at "
+                    f"{pulls} of {len(time)} communication points")  # fmt: skip
     axes = figure.add_subplot(grid[:, 0])
-    every = np.unique(np.searchsorted(time, np.arange(0.0, time[-1] + EVERY / 2, EVERY) - 1e-6).clip(0, len(time) - 1))
+    x, y = towed["first.pose.x"], towed["first.pose.y"]
+    along = np.append(0.0, np.hypot(np.diff(x), np.diff(y)).cumsum())
+    apart = max(towed.tow.craft.length, float(along[-1]) / PLACES)
+    between = np.searchsorted(along, np.arange(apart, along[-1] - 0.999 * apart, apart))
     _draw_paths(axes, towed)
-    for i in every:
+    for i in (0, *between, len(time) - 1):
         _draw_craft(axes, towed, int(i))
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()
-    axes.set_title(f"Paths; craft and line every {EVERY:g} s")
+    axes.set_title(f"Paths; craft and line every {apart:.3g} m of the first")
     axes.legend(loc="lower left")
     tension = figure.add_subplot(grid[0, 1])
     tension.plot(time, towed["tension"], color=INK, linewidth=1.2)
@@ -62,7 +65,9 @@ def plot_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
     _label(distance, "Distance of its ends; dashed: below it hangs loose", "[m]")
     speed = figure.add_subplot(grid[2, 1], sharex=tension)
     for craft, color in COLORS.items():
-        speed.plot(time, np.hypot(towed[f"{craft}.velocity.x"], towed[f"{craft}.velocity.y"]), color=color)
+        speed.plot(time, np.hypot(towed[f"{craft}.velocity.x"], towed[f"{craft}.velocity.y"]), color=color,
+                   label=craft)  # fmt: skip
+    speed.legend()
     _label(speed, "Speeds", "[m/s]")
     speed.set_xlabel("time [s]")
     return save(figure, path)
