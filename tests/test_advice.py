@@ -122,6 +122,7 @@ def test_what_is_looked_for_cannot_be_given(native_fmu: Path) -> None:
 def test_the_command_gives_the_command(shell: Shell) -> None:
     (shell.folder / "log.csv").write_text("time,thrust\n0,5\n3,5\n")
     printed = shell.ok("advise", "--input", "log.csv", "--within", "0.001", "--communication-step", "0.5")
+    assert "ranked by the loads that are worked out" in printed
     assert "log.csv, 3 s: at most 1 mm off" in printed
     shell.ok(*printed.splitlines()[-1].split()[1:])
     refused = shell.run("advise", "--input", "log.csv", "--within", "1e-300", "--communication-step", "0.5")

@@ -412,7 +412,7 @@ def test_what_is_not_installed_is_named(name: str, tmp_path: Path) -> None:
     command = [sys.executable, "-W", "error", "-c", "from hovercraft_fmu.cli import main; main()", *arguments]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout) == (1, "")
-    assert f"pip install 'hovercraft-fmu{extra}'" in done.stderr
+    assert f"pip install 'hovercraft-fmu{extra}', in a checkout '.{extra}'" in done.stderr
     assert len(done.stderr.splitlines()) == 1
 
 

@@ -314,6 +314,7 @@ def _print_advice(advice: "Advice") -> None:
     run = advice.run
     OUTPUT.print(f"{run.title}, {run.stop_time - run.start_time:g} s: at most {metres(advice.within)} off")
     print_table(("", "setting", "sub-steps", "loads", "time", "off, as told", "off a reference run"), rows)
+    OUTPUT.print("ranked by the loads that are worked out, the same on every machine; times are of this one")
     OUTPUT.print(
         f"a host that holds the inputs over communication steps of {run.communication_step:g} s is "
         f"{metres(advice.held)} off, whatever the method"

@@ -34,7 +34,8 @@ def new_figure(**options: Any) -> "Figure":
         module = importlib.import_module("matplotlib.figure")
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
-            "pictures need matplotlib, which is not installed: pip install 'hovercraft-fmu[plot]'"
+            "pictures need matplotlib, which is not installed: "
+            "pip install 'hovercraft-fmu[plot]', in a checkout '.[plot]'"
         ) from error
     figure: Figure = module.Figure(**options)
     return figure

@@ -213,7 +213,8 @@ def check_output(path: str | os.PathLike[str], what: str = "output") -> Path:
             import_module("pyarrow.parquet")
         except ModuleNotFoundError as error:
             raise ModuleNotFoundError(
-                "Parquet needs pyarrow, which is not installed: pip install 'hovercraft-fmu[sweep]'"
+                "Parquet needs pyarrow, which is not installed: "
+                "pip install 'hovercraft-fmu[sweep]', in a checkout '.[sweep]'"
             ) from error
     return path
 

@@ -67,5 +67,6 @@ def ready(name: str) -> Any:
         if not (error.name or "").startswith(NEEDED):
             raise
         raise ModuleNotFoundError(
-            f"measurements need {error.name}, which is not installed: pip install 'hovercraft-fmu[studies]'"
+            f"measurements need {error.name}, which is not installed: "
+            "pip install 'hovercraft-fmu[studies]', in a checkout '.[studies]'"
         ) from error

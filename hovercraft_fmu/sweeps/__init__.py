@@ -28,5 +28,6 @@ def __getattr__(name: str) -> Any:
         return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
-            f"sweeps need {error.name}, which is not installed: pip install 'hovercraft-fmu[sweep]'"
+            f"sweeps need {error.name}, which is not installed: "
+            "pip install 'hovercraft-fmu[sweep]', in a checkout '.[sweep]'"
         ) from error

@@ -19,12 +19,13 @@ try:
     import pygame as pygame  # the drive's loop takes it from here, with these messages
 except ImportError as error:
     raise ModuleNotFoundError(
-        "the window needs pygame-ce, which is not installed: pip install 'hovercraft-fmu[drive]'"
+        "the window needs pygame-ce, which is not installed: "
+        "pip install 'hovercraft-fmu[drive]', in a checkout '.[drive]'"
     ) from error
 if not getattr(pygame, "IS_CE", False):
     raise ModuleNotFoundError(
         "the window needs pygame-ce, in whose place pygame is installed, of the same name: "
-        "pip uninstall -y pygame pygame-ce, then pip install 'hovercraft-fmu[drive]'"
+        "pip uninstall -y pygame pygame-ce, then pip install 'hovercraft-fmu[drive]', in a checkout '.[drive]'"
     )
 
 SIZE = (1280, 720)
