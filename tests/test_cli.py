@@ -417,9 +417,17 @@ def test_what_is_not_installed_is_named(name: str, tmp_path: Path) -> None:
 
 
 def test_the_measurements_are_listed_with_what_they_take(shell: Shell) -> None:
-    printed = shell.ok("measure", "--help")
+    printed = " ".join(shell.ok("measure", "--help").split())
     for name, each in MEASUREMENTS.items():
-        assert re.search(rf"^ +{name} .*\({each.takes}\)$", printed, re.MULTILINE)
+        assert f" {name} {each.what} ({each.takes})" in printed
+
+
+@pytest.mark.parametrize("width", [40, 80])
+@pytest.mark.parametrize("name", ["", *commands.commands])
+def test_help_fits_the_terminal(name: str, width: int, shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    printed = shell.ok(*filter(None, [name]), "--help")
+    assert max(map(len, printed.splitlines())) <= width
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full: not on this system")
@@ -432,3 +440,7 @@ def test_what_is_full_is_named(shell: Shell) -> None:
         command = [sys.executable, "-m", "hovercraft_fmu", "simulate", "--list-scenes"]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
     assert (done.returncode, done.stderr) == (1, "hovercraft-fmu: standard output: No space left on device\n")
+
+
+def test_the_name_of_a_page_is_that_of_the_option(shell: Shell) -> None:
+    assert "--output nc: must end in .html" in shell.refused("play", "--no-open", "--output", "nc", status=2)

@@ -13,6 +13,7 @@ import click
 from .. import stopping
 from .._version import __version__
 from . import demos, files, many, running
+from .helping import HelpContext, write_rows
 from .output import OUTPUT, QUIET_OPTION, VERBOSE_OPTION, VOICE, one_line
 
 __all__ = ["OUTPUT", "commands", "main"]
@@ -58,22 +59,30 @@ def _say(what: str) -> None:
     click.echo(f"hovercraft-fmu: {what}", err=True)
 
 
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+class _Front(click.Group):
+    """Its help says what to begin with."""
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_help_text(ctx, formatter)
+        write_rows(formatter, "New here", [(f"{ctx.info_name} {words}", what) for words, what in FIRST.items()])
+
+
+FIRST = {
+    "demo": "build, check and drive it; see build/demo/",
+    "demo --loop": "the same with an autopilot at the helm",
+    "build": "write the FMUs and the SSP files into build/",
+    "play": "the arrow keys, in a browser",
+    "drive": "the arrow keys, in a window",
+    "simulate --plot a.png": "a run, and its picture",
+    "simulate --help": "what can be set",
+}
+
+
+@click.group(cls=_Front, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, message="%(version)s")
 @click.pass_context
 def commands(context: click.Context) -> None:
-    """Build, check, run and draw the hovercraft FMU.
-
-    \b
-    New here?
-      hovercraft-fmu demo                          build, check and drive it; see build/demo/
-      hovercraft-fmu demo --loop                   the same with an autopilot at the helm
-      hovercraft-fmu build                         write the FMUs and the SSP files into build/
-      hovercraft-fmu play                          the arrow keys, in a browser
-      hovercraft-fmu drive                         the arrow keys, in a window
-      hovercraft-fmu simulate --scene turn --plot turn.png
-      hovercraft-fmu simulate --help               what can be set
-    """
+    """Build, check, run and draw the hovercraft FMU."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
@@ -92,4 +101,6 @@ for each in (
     files.cross_check,
 ):
     each.params += [QUIET_OPTION, VERBOSE_OPTION]
+    each.context_class = HelpContext
     commands.add_command(each)
+commands.context_class = HelpContext

@@ -70,6 +70,8 @@ def play(output: Path, no_open: bool) -> None:
     from ..fmu.archive import write_archive
     from ..view.page import page
 
+    if output.suffix != ".html":
+        raise click.UsageError(f"--output {output}: must end in .html")
     path = write_archive(output, page, ".html")
     OUTPUT.print(f"{path}: {path.stat().st_size / 1000:.0f} kB, to be opened in any browser")
     if not no_open and not webbrowser.open(path.resolve().as_uri()):

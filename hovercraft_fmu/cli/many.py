@@ -10,6 +10,7 @@ from rich.progress import MofNCompleteColumn, ProgressColumn, Task
 from rich.text import Text
 
 from ..studies import MEASUREMENTS, carry_out, ready
+from .helping import write_rows
 from .options import FOLDER, NameOf, PathOf, make_room, named_fmu, of_an_fmu
 from .output import OUTPUT, json_option, print_json, print_table, progress_of
 
@@ -18,22 +19,28 @@ if TYPE_CHECKING:
 
 SHOWN_RUNS = 10
 """Numbers of runs that are listed."""
-MEASURE = """Measure the product: what speed costs, what accuracy costs, where the methods break.
-
-NAME is one of these; what each takes is on a machine with nothing else to do:
-
-\b
-"""
-MEASURE += "\n".join(f"  {name:12} {each.what} ({each.takes})" for name, each in MEASUREMENTS.items())
 
 
-@click.command(help=MEASURE)
+class _Measure(click.Command):
+    """Its help lists what there is to be measured."""
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_help_text(ctx, formatter)
+        rows = [(name, f"{each.what} ({each.takes})") for name, each in MEASUREMENTS.items()]
+        write_rows(formatter, "NAME", rows)
+
+
+@click.command(cls=_Measure)
 @click.argument("name", metavar="NAME", type=NameOf(lambda: MEASUREMENTS))
 @click.option("--quick", is_flag=True, help="Fewer cases: below half a minute.")
 @click.option(
     "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR", help="Default: build/measure/NAME."
 )
-def measure(name: str, quick: bool, output: Path | None) -> None:  # noqa: D103 - MEASURE
+def measure(name: str, quick: bool, output: Path | None) -> None:
+    """Measure the product: what speed costs, what accuracy costs, where the methods break.
+
+    What each takes is on a machine with nothing else to do.
+    """
     folder = output or FOLDER / "measure" / name
     ready(name)
     takes = "less than half a minute" if quick else MEASUREMENTS[name].takes
