@@ -440,7 +440,3 @@ def test_what_is_full_is_named(shell: Shell) -> None:
         command = [sys.executable, "-m", "hovercraft_fmu", "simulate", "--list-scenes"]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
     assert (done.returncode, done.stderr) == (1, "hovercraft-fmu: standard output: No space left on device\n")
-
-
-def test_the_name_of_a_page_is_that_of_the_option(shell: Shell) -> None:
-    assert "--output nc: must end in .html" in shell.refused("play", "--no-open", "--output", "nc", status=2)

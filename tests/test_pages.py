@@ -2,7 +2,6 @@
 
 import re
 import zipfile
-import zlib
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -114,6 +113,5 @@ def assert_complete_and_small(fmu: Path) -> None:
     assert {link for link in links if not re.match("https?:|#", link)} | {"index.html"} == files.keys()
     assert {Path(name).suffix for name in files} <= {".html", ".png", ".svg", ".txt"}
     assert len(files) <= DOCUMENTS_MAX
-    play = len(zlib.compress(files.get("play.html", b""), 9))
     assert len(files.get("play.html", b"")) <= PAGE_MAX
     assert fmu.stat().st_size < SIZE_MAX + PAGE_MAX

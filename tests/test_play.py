@@ -411,4 +411,5 @@ def test_the_command_writes_it_and_opens_it(file: Path, shell: Shell, monkeypatc
     assert "no browser" not in shell.ok("play", "--output", "own.html")
     shell.ok("play", "--no-open")
     assert len(asked) == 2
-    assert "must end in .html" in shell.refused("play", "--output", "play.htm")
+    refused = shell.refused("play", "--output", "play.htm", status=2)
+    assert refused == "hovercraft-fmu: --output play.htm: must end in .html\n"

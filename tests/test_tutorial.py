@@ -17,6 +17,8 @@ from tests.conftest import Fresh
 
 PAGE = pages()["tutorial.html"]
 BLOCKS = [html.unescape(text) for text in re.findall(r'<pre class="python">\n(.*?)</pre>', PAGE, re.DOTALL)]
+SECTIONS = re.findall(r'<p>((?:(?!<p>).)*?)<pre class="python">', PAGE, re.DOTALL)
+"""What stands before each."""
 PRINTED = (
     r"end: \(.*\) m",
     r"200 kg: .* in a minute",
@@ -44,7 +46,10 @@ def test_its_code_runs(number: int, native_fmu: Path, autopilot: Path, fresh: Fr
     for path in (native_fmu, autopilot):
         shutil.copy(path, tmp_path / "build" / path.name)
     build_ssp(tmp_path / "build" / "HovercraftNativeLoop.ssp", native_fmu, autopilot)
-    assert re.search(PRINTED[number], fresh(code))
+    printed = fresh(code)
+    assert re.search(PRINTED[number], printed)
+    assert "libcosimpy" in code or "warning" not in printed.lower()  # fmpy prints it of an input without a column
+    assert "this package" in SECTIONS[number] or "hovercraft_fmu" not in code
 
 
 @pytest.mark.once
