@@ -136,7 +136,7 @@ static double a_double(struct bytes *bytes)
     if (kind < 160)
         return usual[kind % (sizeof usual / sizeof *usual)];
     if (kind < 220)
-        return ((double)a_byte(bytes) - 64.0) / 16.0;
+        return ((int)a_byte(bytes) - 64) / 16.0; /* in integers: rounded down, 64.0 - 64.0 is -0.0 */
     take(bytes, &value, sizeof value);
     return value;
 }
