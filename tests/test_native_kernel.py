@@ -101,7 +101,8 @@ RUBBING = st.builds(
     rotational_drag=st.sampled_from([0.0, 0.5]),
     air_density=st.sampled_from([0.0, 1.225]),
 )
-SLOW = st.builds(State, heading=numbers(-4.0, 4.0), vx=AT_OR_NEAR_REST, vy=AT_OR_NEAR_REST, yaw_rate=AT_OR_NEAR_REST)
+SLOW = st.builds(State, x=numbers(-1e3, 1e3), y=numbers(-1e3, 1e3), heading=numbers(-4.0, 4.0), vx=AT_OR_NEAR_REST,
+                 vy=AT_OR_NEAR_REST, yaw_rate=AT_OR_NEAR_REST)  # fmt: skip
 """Where friction holds, or lets go, or stops a craft within a step."""
 CRAFT_AND_STATE = st.one_of(st.tuples(crafts, states), st.tuples(calm_crafts, states), st.tuples(RUBBING, SLOW))
 
