@@ -48,11 +48,11 @@ def test_a_script_runs(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert re.search(PRINTED[name], capsys.readouterr().out, re.MULTILINE)
 
 
-def test_the_loop_in_libcosim_runs(folder: Path, native_fmu: Path, autopilot: Path, fresh: Fresh) -> None:
+def test_the_loop_in_libcosim_runs(folder: Path, native_fmu: Path, native_autopilot: Path, fresh: Fresh) -> None:
     """In a process of its own, as it loads a library that others wrote."""
     if missing := HOSTS["libcosimpy"].missing():
         pytest.skip(missing)
-    shutil.copy(build_ssp(folder / "HovercraftNativeLoop.ssp", native_fmu, autopilot), folder / "build")
+    shutil.copy(build_ssp(folder / "HovercraftNativeLoop.ssp", native_fmu, native_autopilot), folder / "build")
     printed = fresh((HERE / "in_libcosim.py").read_text(encoding="utf-8"))
     assert re.search(r"^after 5 min: \(\d\d\.\d, -?\d+\.\d\) m$", printed, re.MULTILINE)
 
