@@ -4,6 +4,7 @@ import os
 import platform
 import subprocess
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -84,8 +85,11 @@ def validate_ssp(path: str | os.PathLike[str]) -> Iterator[Check]:
     """
     path = Path(path)
     with temporary_folder() as folder:
-        with zipfile.ZipFile(path) as archive:
-            archive.extractall(folder)
+        try:
+            with zipfile.ZipFile(path) as archive:
+                archive.extractall(folder)
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:  # as zipfile raises them
+            raise ValueError(f"{path}: must be an archive that can be extracted; {error}") from error
         found = (each for each in sorted(Path(folder).rglob("*")) if each.is_file())
         files = {each.relative_to(folder).as_posix(): each for each in found}
         schemas = [_ssp_problems(name, file) for name, file in files.items() if file.suffix in SSP_SCHEMAS]

@@ -85,3 +85,15 @@ def test_where_it_is_hard_to_live(where: str, fmu: Path, tmp_path: Path) -> None
     assert message in done.stderr
     assert len(done.stderr.splitlines()) == bool(message)
     assert (tmp_path / "a.png").exists() == (not message)
+
+
+def test_an_ssp_file_whose_member_is_spoiled_fails_its_first_check(tmp_path: Path) -> None:
+    """A stream that cannot be unpacked, as found by `python -m tests.fuzz files`."""
+    path = tmp_path / "Spoiled.ssp"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("SystemStructure.ssd", b"structure" * 100)
+    content = bytearray(path.read_bytes())
+    content[30 + len("SystemStructure.ssd")] = 0xFF  # the first byte after the local header: no kind of block
+    path.write_bytes(content)
+    (check,) = check_file(path)
+    assert check.problems[0].startswith(f"{path}: must be an archive that can be extracted; ")

@@ -4,6 +4,7 @@ import os
 import platform
 import sys
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -265,7 +266,7 @@ def _foreign(path: Path, expected: Product) -> str:
     try:
         with zipfile.ZipFile(path) as archive:
             root = fromstring(archive.read("modelDescription.xml"))  # noqa: S314 - entities are bounded
-    except (zipfile.BadZipFile, KeyError, ParseError) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, KeyError, ParseError) as error:
         return f"must be an FMU with a model description ({error})"
     version, token = root.get("version"), root.get("guid") or root.get("instantiationToken")
     if version != __version__:
