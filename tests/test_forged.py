@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from hovercraft_fmu.host import Fmu, SimulationError
+from hovercraft_fmu.validation import check_file
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="paths and shells of POSIX")
 
