@@ -22,6 +22,8 @@ from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.view.page import FILE, FOLDER, page
 from tests.conftest import Built
 from tests.native import STEPS
+
+pytestmark = pytest.mark.once
 from tests.shell import Shell
 
 Opened = Callable[..., Page]
