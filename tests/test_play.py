@@ -22,9 +22,9 @@ from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.view.page import FILE, FOLDER, page
 from tests.conftest import Built
 from tests.native import STEPS
+from tests.shell import Shell
 
 pytestmark = pytest.mark.once
-from tests.shell import Shell
 
 Opened = Callable[..., Page]
 COMMUNICATION_STEP, DURATION = 0.1, 60.0
