@@ -1,6 +1,7 @@
 """The C of the native FMU as this machine's compiler builds it, through ctypes."""
 
 import itertools
+import shutil
 import subprocess
 from collections.abc import Iterable, Sequence
 from ctypes import (
@@ -19,12 +20,14 @@ from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import pytest
 
 from hovercraft_fmu import elsewhere
 from hovercraft_fmu.elsewhere import compiler
 from hovercraft_fmu.fmu.description import NATIVE, Flavour
 from hovercraft_fmu.fmu.machine_code import OPTIONS, c_file, c_folders, headers, sources
+from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.error_estimate import Companion
@@ -215,3 +218,15 @@ class Text:
     def string(self, form: str, value: str) -> str:
         self.library.text_of_string(self.buffer, c_char_p(form.encode()), c_char_p(value.encode()))
         return self.buffer.value.decode()
+
+
+    """The native FMU, its sources compiled with the platform's sine, cosine and arctangent, which Python uses, too."""
+    """The native FMU, its own sources compiled with the platform's sine, cosine and arctangent, which Python uses, too."""
+    fmpy.extract(str(fmu), unzipdir=str(folder))
+    for name, content in headers(flavour).items():
+        (folder / "sources" / name).write_bytes(content)
+    library = folder / "binaries" / binary("x86_64-linux", flavour)
+    command = [c_compiler(), *OPTIONS, "-shared", "-fPIC", "-DHOVERCRAFT_LIBM", "-o", str(library), flavour.unit,
+               f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX", "-lm"]  # fmt: skip
+    subprocess.run(command, cwd=folder / "sources", check=True)
+    return Path(shutil.make_archive(str(folder / "libm"), "zip", folder)).rename(folder / "libm.fmu")

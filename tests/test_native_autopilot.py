@@ -3,7 +3,6 @@
 import math
 import random
 import re
-import shutil
 import subprocess
 import zipfile
 from collections.abc import Callable, Iterator
@@ -20,12 +19,12 @@ from hovercraft_fmu.building.ssp import build_ssp
 from hovercraft_fmu.coupling import sail
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3
 from hovercraft_fmu.fmu.interface import STATES
-from hovercraft_fmu.fmu.machine_code import C_FOLDER, OPTIONS, headers
+from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.host import Fmu, Instance, SimulationError
 from hovercraft_fmu.scenes import VOYAGES
 from tests.lowlevel import one, start
-from tests.native import C_INCLUDES, C_TESTS, c_compiler, compile_c
+from tests.native import C_INCLUDES, C_TESTS, compile_c, compiled_with_libm
 
 OUTPUTS = tuple(v.name for v in AUTOPILOT_MODEL.variables if v.causality == "output")
 ON_ICE = {"mass": 100.0, "cruise_speed": 2.0, "thrust_min": -10.0}
@@ -41,16 +40,8 @@ MINDS: dict[str, dict[str, float]] = {
 
 @pytest.fixture(scope="module")
 def with_libm(each_native_autopilot: Path, standard: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The FMU, its own sources compiled with the platform's sine, cosine and arctangent, which Python uses, too."""
-    folder, flavour = tmp_path_factory.mktemp("libm"), AUTOPILOT_NATIVE if standard == 2 else AUTOPILOT_NATIVE3
-    fmpy.extract(str(each_native_autopilot), unzipdir=str(folder))
-    for name, content in headers(flavour).items():
-        (folder / "sources" / name).write_bytes(content)
-    library = folder / "binaries" / binary("x86_64-linux", flavour)
-    command = [c_compiler(), *OPTIONS, "-shared", "-fPIC", "-DHOVERCRAFT_LIBM", "-o", str(library), flavour.unit,
-               f"-DFMI{standard}_OVERRIDE_FUNCTION_PREFIX", "-lm"]  # fmt: skip
-    subprocess.run(command, cwd=folder / "sources", check=True)
-    return Path(shutil.make_archive(str(folder / "libm"), "zip", folder)).rename(folder / "libm.fmu")
+    flavour = AUTOPILOT_NATIVE if standard == 2 else AUTOPILOT_NATIVE3
+    return compiled_with_libm(each_native_autopilot, flavour, tmp_path_factory.mktemp("libm"))
 
 
 def voyage(fmu: Path, mind: dict[str, float], seed: int) -> Iterator[list[float]]:

@@ -1,13 +1,10 @@
 """The tether: its law, its FMU, and a tow by three FMUs and a master."""
 
 import math
-import shutil
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,8 +13,6 @@ from lxml import etree
 from hovercraft_fmu.building.ssp import build_tow_ssp
 from hovercraft_fmu.coupling import GAUSS_SEIDEL, JACOBI
 from hovercraft_fmu.elsewhere import HOSTS, rows_of_module
-from hovercraft_fmu.fmu.machine_code import OPTIONS, headers
-from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.host import Fmu, SimulationError
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import State
@@ -30,7 +25,7 @@ from hovercraft_fmu.tether.tether_package import build_tether
 from hovercraft_fmu.towing import BEND, COLUMNS, Tow, haul, haul_bare
 from hovercraft_fmu.validation import validate_ssp
 from tests.conftest import FMI_2, Built
-from tests.native import c_compiler
+from tests.native import compiled_with_libm
 from tests.strategies import states
 from tests.tow_masters import CONNECTIONS, MASTERS, SHOWN, STARTS, STRAIGHT
 
@@ -136,16 +131,8 @@ def test_a_force_without_end_is_refused_and_the_last_one_stands(tether: Path) ->
 
 @pytest.fixture(scope="module")
 def with_libm(each_native_tether: Path, standard: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The native FMU, its own sources compiled with the platform's sine and cosine, which Python uses, too."""
-    folder, flavour = tmp_path_factory.mktemp("libm"), TETHER_NATIVE if standard == 2 else TETHER_NATIVE3
-    fmpy.extract(str(each_native_tether), unzipdir=str(folder))
-    for name, content in headers(flavour).items():
-        (folder / "sources" / name).write_bytes(content)
-    library = folder / "binaries" / binary("x86_64-linux", flavour)
-    command = [c_compiler(), *OPTIONS, "-shared", "-fPIC", "-DHOVERCRAFT_LIBM", "-o", str(library), flavour.unit,
-               f"-DFMI{standard}_OVERRIDE_FUNCTION_PREFIX", "-lm"]  # fmt: skip
-    subprocess.run(command, cwd=folder / "sources", check=True)
-    return Path(shutil.make_archive(str(folder / "libm"), "zip", folder)).rename(folder / "libm.fmu")
+    flavour = TETHER_NATIVE if standard == 2 else TETHER_NATIVE3
+    return compiled_with_libm(each_native_tether, flavour, tmp_path_factory.mktemp("libm"))
 
 
 @BOTH
