@@ -220,8 +220,8 @@ class Text:
         return self.buffer.value.decode()
 
 
+def compiled_with_libm(fmu: Path, flavour: Flavour, folder: Path) -> Path:
     """The native FMU, its sources compiled with the platform's sine, cosine and arctangent, which Python uses, too."""
-    """The native FMU, its own sources compiled with the platform's sine, cosine and arctangent, which Python uses, too."""
     fmpy.extract(str(fmu), unzipdir=str(folder))
     for name, content in headers(flavour).items():
         (folder / "sources" / name).write_bytes(content)
