@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 from click.shell_completion import ShellComplete
+from click.testing import CliRunner
 from PIL import Image
 from rich.console import Group
 from rich.table import Table
@@ -33,6 +34,13 @@ def test_hints_are_printed_as_they_stand() -> None:
     with OUTPUT.capture() as printed:
         OUTPUT.print(Group(hint, table))
     assert printed.get().count(hint) == 4
+
+
+def test_a_command_is_heard_after_a_quiet_one(tmp_path: Path) -> None:
+    """In one process, as tests and notebooks have it."""
+    build = ["build", "python", "--output", str(tmp_path)]
+    before, after = (CliRunner().invoke(commands, [*build, *quiet]).output for quiet in (("--quiet",), ()))
+    assert (before, after != "") == ("", True)
 
 
 def test_bare_command_helps(shell: Shell) -> None:

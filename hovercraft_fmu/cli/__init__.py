@@ -6,7 +6,7 @@ A command loads what it needs when it runs: `--help` is there at once.
 import sys
 import traceback
 from time import perf_counter
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -25,7 +25,6 @@ EXPECTED = (ValueError, OSError, ArithmeticError, ModuleNotFoundError)
 def main(arguments: list[str] | None = None) -> None:
     """Run the command and leave the process: status 0; 1 after a line for each thing that is wrong, 2 where it is in
     how the command was used; 130 where it was stopped."""
-    OUTPUT.quiet = VOICE.is_verbose = False
     begun = perf_counter()
     try:
         status = commands.main(arguments, prog_name="hovercraft-fmu", standalone_mode=False)
@@ -60,7 +59,11 @@ def _say(what: str) -> None:
 
 
 class _Front(click.Group):
-    """Its help says what to begin with."""
+    """Its help says what to begin with; a command is not quiet because an earlier one of the same process was."""
+
+    def make_context(self, *arguments: Any, **options: Any) -> click.Context:
+        OUTPUT.quiet = VOICE.is_verbose = False
+        return super().make_context(*arguments, **options)
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         super().format_help_text(ctx, formatter)
