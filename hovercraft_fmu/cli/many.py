@@ -95,7 +95,7 @@ def sweep(
     same command.
     """
     from ..sweeps import read_study, sweep
-    from ..sweeps.store import extremes, unreached
+    from ..sweeps.reading import extremes, unreached
 
     chosen = read_study(study)
     if plot:
@@ -139,7 +139,7 @@ class _Rate(ProgressColumn):
 
 
 def _print_extremes(folder: Path) -> None:
-    from ..sweeps.store import extremes
+    from ..sweeps.reading import extremes
 
     rows = []
     for each in extremes(folder):

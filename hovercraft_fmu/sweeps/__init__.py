@@ -4,15 +4,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .reading import load
     from .runner import Outcome, sweep
-    from .store import load
     from .study import STUDIES, Study, read_study
 
 _HOMES = {
     "STUDIES": "study",
     "Outcome": "runner",
     "Study": "study",
-    "load": "store",
+    "load": "reading",
     "read_study": "study",
     "sweep": "runner",
 }

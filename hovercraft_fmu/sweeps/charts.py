@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..drawing.figures import check_plot, new_figure, save
 from ..drawing.palette import SEA, SHADES
 from .quantities import display
-from .store import KEY, TRAJECTORIES, load
+from .reading import load
+from .store import KEY, TRAJECTORIES
 from .study import GRID
 
 if TYPE_CHECKING:

@@ -4,15 +4,14 @@ Every file says which sweep it is of, which chunk it is, how many rows it has, a
 """
 
 import hashlib
-import io
 import json
 import os
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import numpy as np
 import pyarrow as pa
@@ -20,7 +19,6 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..whole import written
-from .quantities import display
 
 if sys.platform == "win32":
     import msvcrt
@@ -54,7 +52,7 @@ class Store:
         self.spoiled: list[str] = []
         """What was set aside, and why: it must be made anew."""
         wrong: dict[Path, str] = {}
-        for path in _files(folder, RUNS):
+        for path in chunk_files(folder, RUNS):
             whole = [folder / what / path.name for what in about["files"]]
             found = {each: why for each in whole if (why := _wrong(each, about))}
             wrong |= found
@@ -90,7 +88,7 @@ def store(folder: Path, about: Mapping[str, Any], overwrite: bool = False) -> It
         _take(lock, folder)
         for left in folder.glob("*/.*.parquet.*[0-9]"):  # of one that was killed
             left.unlink()
-        for path in (*_files(folder, RUNS), *_files(folder, TRAJECTORIES)) if overwrite else ():
+        for path in (*chunk_files(folder, RUNS), *chunk_files(folder, TRAJECTORIES)) if overwrite else ():
             path.unlink()
         yield Store(folder, about)
 
@@ -112,8 +110,8 @@ def _take(lock: IO[bytes], folder: Path) -> None:
 ANOTHER = "another sweep ("
 
 
-def _files(folder: Path, what: str) -> list[Path]:
-    """Raises ValueError where there are others."""
+def chunk_files(folder: Path, what: str) -> list[Path]:
+    """The files of the chunks that are there, in their order. Raises ValueError where there are others."""
     found = sorted(path for path in (folder / what).glob("*.parquet") if not path.name.startswith("."))
     for path in found:
         if not NAME.fullmatch(path.stem):
@@ -124,26 +122,28 @@ def _files(folder: Path, what: str) -> list[Path]:
 def _wrong(path: Path, about: Mapping[str, Any]) -> str:
     """Why a file is none of that sweep; '' where it is right."""
     try:
-        there, _ = _opened(path)
+        there, _ = opened(path)
     except FileNotFoundError:
         return "is missing"
     except ValueError as error:
         return str(error)
-    return _different(there, about) or _misplaced(path, there)
+    return different(there, about) or misplaced(path, there)
 
 
-def _different(there: Mapping[str, Any], about: Mapping[str, Any]) -> str:
-    different = [name for name in SAME if there.get(name) != about.get(name)]
-    return f"{ANOTHER}{', '.join(different)} differ)" if different else ""
+def different(there: Mapping[str, Any], about: Mapping[str, Any]) -> str:
+    """How what a file says of itself is that of another sweep; '' where it is this one's."""
+    names = [name for name in SAME if there.get(name) != about.get(name)]
+    return f"{ANOTHER}{', '.join(names)} differ)" if names else ""
 
 
-def _misplaced(path: Path, there: Mapping[str, Any]) -> str:
+def misplaced(path: Path, there: Mapping[str, Any]) -> str:
+    """Why a file is not where it belongs; '' where it is."""
     if (there["what"], f"{there['number']:05}") != (path.parent.name, path.stem):
         return f"is chunk {there['number']} of the {there['what']}, under another name"
     return ""
 
 
-def _opened(path: Path) -> tuple[dict[str, Any], bytes]:
+def opened(path: Path) -> tuple[dict[str, Any], bytes]:
     """The metadata and the content of a file that is as it was written. Raises ValueError: it is not."""
     content = path.read_bytes()
     seals = set(SEAL.findall(content))
@@ -158,109 +158,6 @@ def _opened(path: Path) -> tuple[dict[str, Any], bytes]:
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise ValueError("is none that a sweep wrote") from error
     return about, content
-
-
-def load(folder: str | os.PathLike[str], what: str = RUNS) -> pa.Table:
-    """The results of a finished sweep: a row a run, in their order; or the trajectories, a row a point of time.
-
-    The metadata is what all files share: the study, versions, the FMU's SHA-256, as JSON. A file alone, or what is
-    there of a sweep that was ended, is plain Parquet: pandas.read_parquet(folder / "runs").
-
-    Args:
-        folder: of the sweep.
-        what: runs or trajectories.
-
-    Raises:
-        FileNotFoundError: there is no sweep.
-        ValueError: it is not finished; a file is damaged or of another sweep; it kept no trajectories.
-    """
-    if what not in (RUNS, TRAJECTORIES):
-        raise ValueError(f"what = {what!r}: must be one of {RUNS}, {TRAJECTORIES}")
-    folder = Path(folder)
-    files = _files(folder, RUNS)
-    if not files:
-        raise FileNotFoundError(f"{folder}: no sweep is there")
-    about = _checked(files[0], {})[0]
-    chunks = -(-about["runs"] // about["chunk"])
-    if len(files) != chunks:
-        raise ValueError(f"{folder}: {len(files)} of {chunks} chunks are there: finish it with the same command")
-    if what not in about["files"]:
-        raise ValueError(f"{folder}: the sweep kept no trajectories")
-    tables = []
-    for path in files:
-        there, content = _checked(folder / what / path.name, about)
-        tables.append(_table(path, content))
-        assert tables[-1].num_rows == there["rows"]
-    shared = {name: value for name, value in about.items() if name not in OF_ONE_FILE}
-    return pa.concat_tables(tables).replace_schema_metadata({KEY: json.dumps(shared)})
-
-
-def _table(path: Path, content: bytes) -> pa.Table:
-    try:
-        return pq.read_table(io.BytesIO(content)).replace_schema_metadata(None)
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: is none that a sweep wrote: remove it; the same command makes it anew") from error
-
-
-def _checked(path: Path, about: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
-    """The metadata and the content. Raises ValueError where it is damaged, elsewhere, or of another sweep."""
-    with suppress(FileNotFoundError):
-        try:
-            there, content = _opened(path)
-            why = (_different(there, about) if about else "") or _misplaced(path, there)
-        except ValueError as error:
-            why = str(error)
-        if not why:
-            return there, content
-        raise ValueError(f"{path}: {why}; the same command makes it anew")
-    raise ValueError(f"{path}: is missing; the same command makes it anew")
-
-
-class Extreme(NamedTuple):
-    """The least and the greatest of a column, in its display unit, and the runs that they are of."""
-
-    column: str
-    unit: str
-    least: float
-    least_run: dict[str, Any]
-    """Swept parameter, with its display unit -> value"""
-    greatest: float
-    greatest_run: dict[str, Any]
-
-
-def extremes(folder: str | os.PathLike[str]) -> list[Extreme]:
-    """Between what the columns of a finished sweep lie; of those that have a value at all. Raises as `load` does."""
-    runs = load(folder)
-    about = json.loads(runs.schema.metadata[KEY])
-    found = []
-    for name in about["kept"]:
-        values = runs[name].to_numpy()
-        if np.isnan(values).all():
-            continue
-        shown, factor = display(name)
-        places = int(np.nanargmin(values)), int(np.nanargmax(values))
-        (low, low_run), (high, high_run) = (
-            (float(values[i]) * factor, dict(_shown(each, runs[each][i].as_py()) for each in about["swept"]))
-            for i in places
-        )
-        found.append(Extreme(name, shown, low, low_run, high, high_run))
-    return found
-
-
-def _shown(name: str, value: Any) -> tuple[str, Any]:
-    """A swept parameter as people read it: degrees, where it is an angle."""
-    unit, factor = display(name)
-    return (f"{name} [{unit}]", value * factor) if factor != 1.0 else (name, value)
-
-
-def unreached(folder: str | os.PathLike[str]) -> dict[str, list[int]]:
-    """Event -> the numbers of the runs that never reached it, of the runs that were not refused. Raises as `load`."""
-    runs = load(folder)
-    about = json.loads(runs.schema.metadata[KEY])
-    made = np.array([each is None for each in runs["error"].to_pylist()])
-    events = json.loads(about["study"])["keep"].get("events", {})
-    missed = {name: np.isnan(runs[f"{name}.time"].to_numpy()) & made for name in events}
-    return {name: runs["run"].to_numpy()[where].tolist() for name, where in missed.items() if where.any()}
 
 
 # ---- tables
