@@ -1,0 +1,83 @@
+"""What every part of the coverage hands over, and what is said of it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parent.parent.parent
+AT_MOST = 20
+"""Exceptions."""
+
+
+class Branch(NamedTuple):
+    """One way out of a decision."""
+
+    file: str
+    """From ROOT."""
+    line: int
+    """From 1."""
+    column: int
+    way: str
+    """'true', 'false', or where it goes."""
+
+
+class Exempt(NamedTuple):
+    """A branch that no test takes."""
+
+    file: str
+    text: str
+    """Of its line, or a part of it that no other line of the file has."""
+    way: str
+    why: str
+
+
+Taken = Mapping[Branch, bool]
+"""Whether each branch of some files was taken."""
+
+
+def closing_lines(taken: Taken, exceptions: Sequence[Exempt], goal: Sequence[str]) -> tuple[list[str], bool]:
+    """Lines for each file, the exceptions, and what is wrong; and whether all is well.
+
+    Args:
+        taken: of all parts that were measured.
+        exceptions: of all parts; those of files that were not measured are left out.
+        goal: folders and files, from ROOT, of which every branch is to be taken or listed.
+    """
+    files = sorted({branch.file for branch in taken})
+    lines, wrong = [], []
+    for file in files:
+        of_file = {branch: was for branch, was in taken.items() if branch.file == file}
+        lines.append(f"{file}: {sum(of_file.values())} of {len(of_file)} branches")
+        listed = [each for each in exceptions if each.file == file]
+        for each in listed:
+            same = [branch for branch in of_file if is_meant(each, branch)]
+            lines.append(f"  listed: {each.text} ({each.way}): {each.why}")
+            if not same:
+                wrong.append(f"{file}: no branch is {each.text!r} ({each.way}), which is listed")
+            wrong += [f"{at(branch)}: is taken, and listed" for branch in same if of_file[branch]]
+        if file.startswith(tuple(goal)):
+            missed = [branch for branch, was in of_file.items() if not was]
+            wrong += [
+                f"{at(branch)}: {text(branch)}: neither taken nor listed"
+                for branch in sorted(missed)
+                if not any(is_meant(each, branch) for each in listed)
+            ]
+    if len(exceptions) > AT_MOST:
+        wrong.append(f"{len(exceptions)} exceptions: must be at most {AT_MOST}")
+    total = f"{sum(taken.values())} of {len(taken)} branches in {len(files)} files"
+    return [*lines, *wrong, f"{total}; {len(wrong)} to be mended" if wrong else total], not wrong
+
+
+def is_meant(exempt: Exempt, branch: Branch) -> bool:
+    """Whether that branch is the one that is listed."""
+    return (exempt.file, exempt.way) == (branch.file, branch.way) and exempt.text in text(branch)
+
+
+def text(branch: Branch) -> str:
+    """Of its line."""
+    return (ROOT / branch.file).read_text(encoding="utf-8").splitlines()[branch.line - 1].strip()
+
+
+def at(branch: Branch) -> str:
+    """Where it is, for a reader."""
+    return f"{branch.file}:{branch.line}:{branch.column} ({branch.way})"
