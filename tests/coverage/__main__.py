@@ -1,7 +1,8 @@
 """python -m tests.coverage [--c] [--python] [--page] [TEST_FILE ...]: the branches that the ordinary suite takes.
 
 Without options all of them, without files the whole suite. A copy of the tree is tested, each test file in a pytest of
-its own; c.py says what it leaves in build/coverage/. Ends with 1 where a branch of the goal is neither taken nor listed
+its own; c.py and python.py say what they leave in
+build/coverage/. Ends with 1 where a branch of the goal is neither taken nor listed
 in exceptions.py, where a listed one is taken, and where a test fails.
 """
 
@@ -9,12 +10,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from tests.coverage import c
+from tests.coverage import c, page, python
 from tests.coverage.branches import ROOT, closing_lines
 from tests.coverage.exceptions import EXCEPTIONS
 from tests.coverage.suite import Part, run
 
-PARTS: dict[str, type[Part]] = {"c": c.C}
+PARTS: dict[str, type[Part]] = {"c": c.C, "python": python.Python, "page": page.Page}
 """By the names of the options."""
 
 

@@ -72,10 +72,15 @@ def _script(main: str) -> str:
         for needed in IMPORT.findall(text):
             if needed not in texts:
                 take(needed)
-        texts[name] = re.sub(r"^export ", "", IMPORT.sub("", text), flags=re.MULTILINE)
+        texts[name] = module_text(text)
 
     take(main)
     return "\n".join(texts.values())
+
+
+def module_text(source: str) -> str:
+    """What of a module stands in a page's one script."""
+    return re.sub(r"^export ", "", IMPORT.sub("", source), flags=re.MULTILINE)
 
 
 def _data(flavour: Flavour) -> dict[str, Any]:
