@@ -8,6 +8,7 @@ in exceptions.py, where a listed one is taken, and where a test fails.
 
 import argparse
 import sys
+from fnmatch import fnmatch
 from pathlib import Path
 
 from tests.coverage import c, page, python
@@ -17,6 +18,7 @@ from tests.coverage.suite import Part, run
 
 PARTS: dict[str, type[Part]] = {"c": c.C, "python": python.Python, "page": page.Page}
 """By the names of the options."""
+TESTS = "test_*.py"
 
 
 def main() -> int:
@@ -26,8 +28,11 @@ def main() -> int:
         parser.add_argument(f"--{name}", action="store_true", help=part.__doc__)
     parser.add_argument("files", nargs="*", type=Path, metavar="TEST_FILE", help="the whole suite without it")
     given = parser.parse_args()
+    for file in given.files:
+        if not (file.is_file() and fnmatch(file.name, TESTS) and file.resolve().parent == ROOT / "tests"):
+            sys.exit(f"{file}: must be a file of tests, tests/{TESTS}")
     files = [file.resolve().relative_to(ROOT) for file in given.files] or sorted(
-        path.relative_to(ROOT) for path in (ROOT / "tests").glob("test_*.py")
+        path.relative_to(ROOT) for path in (ROOT / "tests").glob(TESTS)
     )
     wanted = [part for name, part in PARTS.items() if getattr(given, name)] or list(PARTS.values())
     for part in wanted:
@@ -41,7 +46,7 @@ def main() -> int:
     lines, well = closing_lines(taken, EXCEPTIONS, goal)
     print("\n".join(lines))
     for file in failed:
-        print(f"{file}: a test failed: build/coverage/{file.stem}.txt")
+        print(f"{file}: a test failed, or there is none: build/coverage/{file.stem}.txt")
     return 0 if well and not failed else 1
 
 
