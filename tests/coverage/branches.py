@@ -55,8 +55,10 @@ def closing_lines(taken: Taken, exceptions: Sequence[Exempt], goal: Sequence[str
             if not same:
                 wrong.append(f"{file}: no branch is {each.text!r} ({each.way}), which is listed")
             wrong += [f"{at(branch)}: is taken, and listed" for branch in same if of_file[branch]]
+        missed = [branch for branch, was in of_file.items() if not was]
+        if missed:
+            lines.append(f"  not taken, in lines {' '.join(map(str, sorted({branch.line for branch in missed})))}")
         if file.startswith(tuple(goal)):
-            missed = [branch for branch, was in of_file.items() if not was]
             wrong += [
                 f"{at(branch)}: {text(branch)}: neither taken nor listed"
                 for branch in sorted(missed)

@@ -38,7 +38,10 @@ class Part(Protocol):
 
 
 def run(parts: Sequence[type[Part]], files: Sequence[Path]) -> tuple[Taken, list[Path]]:
-    """The branches, and the files of which a test failed, or that have none. Raises RuntimeError where C does not compile."""
+    """The branches, and the files of which a test failed, or that have none.
+
+    Raises RuntimeError: C does not compile.
+    """
     if why := compile_libraries():
         raise RuntimeError(why)
     shutil.rmtree(RESULTS, ignore_errors=True)
