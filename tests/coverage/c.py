@@ -39,7 +39,7 @@ WAYS = (("true", 4), ("false", 5))
 WRAPPER = """\
 #!/bin/sh
 # What {compiler} makes, as clang makes it with counters; what clang cannot make, or what none would count, as it is.
-case " $* " in *" -print-"*|*" -fsanitize"*|*" --version "*) exec {compiler} "$@";; esac
+case " $* " in *" -print-"*|*" --version "*{others}) exec {compiler} "$@";; esac
 {clang} {counting} -w "$@" 2> /dev/null || exec {compiler} "$@"
 while [ $# -gt 1 ]; do
     if [ "$1" = -o ]; then cp "$2" "{objects}/$$-$(basename "$2")"; fi
@@ -64,7 +64,8 @@ class C:
         words = {"clang": shutil.which("clang"), "counting": " ".join(COUNTING), "objects": self.objects}
         for name in COMPILERS:
             if compiler := shutil.which(name):
-                (self.scripts / name).write_text(WRAPPER.format(compiler=compiler, **words))
+                others = "" if name == "clang" else '|*" -fsanitize"*'  # their runtimes are their own
+                (self.scripts / name).write_text(WRAPPER.format(compiler=compiler, others=others, **words))
                 (self.scripts / name).chmod(0o755)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(self._compile, libraries()))
