@@ -345,7 +345,7 @@ def test_a_sweep_keeps_it(native_fmu: Path, tmp_path: Path) -> None:
         "keep": {"end": ["error.position"], "maximum": ["error.heading"]},
     }
     sweep(study, native_fmu, workers=1, output=tmp_path)
-    table = load(tmp_path)
+    table = load(tmp_path).to_table()
     for row, step in zip(table.to_pylist(), (0.1, 0.05), strict=True):
         alone = simulate("turn", native_fmu, stop_time=20.0, start_values=study["set"] | {"step_size": step})
         assert row["end.error.position"] == alone["error.position"][-1]

@@ -66,7 +66,7 @@ def end(way: str, request: pytest.FixtureRequest, tmp_path: Path) -> Any:
             study = {"scene": inputs, "set": RK4, "sweep": {"mass": [100.0]}, "keep": {"end": list(STATES)}}
             given, folder = {} if step is None else {"communication_step": step}, tmp_path / f"{inputs} {step}"
             sweep(study | given, engine="batch", workers=1, output=folder)
-            return [load(folder)[f"end.{name}"][0].as_py() for name in STATES]
+            return [load(folder).to_table()[f"end.{name}"][0].as_py() for name in STATES]
         run = plan(inputs, start_values=RK4, communication_step=step)
         result = run_fmu(run, path) if path else run_model(run)
         return [float(result[name][-1]) for name in STATES]

@@ -181,7 +181,7 @@ def test_a_study_with_such_times(engine: str, native_fmu: Path, tmp_path: Path) 
         }  # fmt: skip
         found = tmp_path / str(start)
         sweep(study, native_fmu if engine == "fmu" else None, workers=1, output=found, engine=engine)
-        path = load(found, "trajectories")
+        path = load(found, "trajectories").to_table()
         assert path["time"].to_pylist() == [start + n * 0.5 for n in range(21)]
         ends.append(path["pose.x"].to_pylist())
     assert ends[1] == pytest.approx(ends[0], rel=0.0, abs=1e-6)

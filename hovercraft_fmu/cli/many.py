@@ -16,9 +16,7 @@ from .output import OUTPUT, json_option, print_json, print_table, progress_of
 
 if TYPE_CHECKING:
     from ..building import Kind
-
-SHOWN_RUNS = 10
-"""Numbers of runs that are listed."""
+    from ..sweeps.reading import Extreme
 
 
 class _Measure(click.Command):
@@ -95,7 +93,7 @@ def sweep(
     same command.
     """
     from ..sweeps import read_study, sweep
-    from ..sweeps.reading import extremes, unreached
+    from ..sweeps.reading import overview
 
     chosen = read_study(study)
     if plot:
@@ -116,14 +114,14 @@ def sweep(
         OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}")
     if outcome.warned:
         OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
-    _print_extremes(outcome.folder)
-    missed = unreached(outcome.folder)
-    for name, runs in missed.items():
-        numbers = ", ".join(map(str, runs[:SHOWN_RUNS])) + (", ..." if len(runs) > SHOWN_RUNS else "")
-        OUTPUT.print(f"{name}: {len(runs)} of {outcome.runs} runs never reached it: run {numbers}")
+    found = overview(outcome.folder)
+    _print_extremes(found.extremes)
+    for event, count, runs in found.unreached:
+        numbers = ", ".join(map(str, runs)) + (", ..." if count > len(runs) else "")
+        OUTPUT.print(f"{event}: {count} of {outcome.runs} runs never reached it: run {numbers}")
     if as_json:
-        found = [each._asdict() for each in extremes(outcome.folder)]
-        print_json({**outcome._asdict(), "seconds": seconds, "extremes": found, "never_reached": missed})
+        extremes, unreached = ([each._asdict() for each in part] for part in found)
+        print_json({**outcome._asdict(), "seconds": seconds, "extremes": extremes, "never_reached": unreached})
     if plot:
         from ..sweeps.charts import plot_sweep
 
@@ -138,11 +136,9 @@ class _Rate(ProgressColumn):
         return Text(f"{task.speed:.3g} runs/s" if task.speed else "")
 
 
-def _print_extremes(folder: Path) -> None:
-    from ..sweeps.reading import extremes
-
+def _print_extremes(extremes: "list[Extreme]") -> None:
     rows = []
-    for each in extremes(folder):
+    for each in extremes:
         cells = [each.column]
         for value, run in ((each.least, each.least_run), (each.greatest, each.greatest_run)):
             cells += [f"{value:.4g} {each.unit}", ", ".join(f"{name} = {part:.4g}" for name, part in run.items())]

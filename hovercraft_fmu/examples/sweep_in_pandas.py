@@ -12,6 +12,6 @@ STUDY = {
 
 if __name__ == "__main__":  # workers read this file, too
     outcome = sweep(STUDY, engine="batch", workers=1, output="build/sweep/masses", overwrite=True)
-    runs = load(outcome.folder).to_pandas()
+    runs = load(outcome.folder).to_table().to_pandas()
     print(runs[["mass", "air_density", "end.pose.x", "maximum.speed"]].describe().round(3))
     print(runs.corr(numeric_only=True).loc[["mass", "air_density"], ["end.pose.x", "maximum.speed"]].round(2))

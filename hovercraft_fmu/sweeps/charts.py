@@ -49,13 +49,13 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
 
 def draw_sweep(folder: str | os.PathLike[str]) -> "Figure":
     """The picture of `plot_sweep`. Raises as it does."""
-    runs = load(folder)
+    runs = load(folder).to_table()
     about = json.loads(runs.schema.metadata[KEY])
     study = json.loads(about["study"])
     swept, kept = about["swept"], about["kept"]
     table = {name: _shown(runs, name) for name in (*swept, *kept)}
     if {"pose.x", "pose.y"} <= set(study["keep"].get("trajectory", {}).get("of", ())):
-        figure = _paths(load(folder, TRAJECTORIES), table, swept[0])
+        figure = _paths(load(folder, TRAJECTORIES).to_table(), table, swept[0])
     elif len(swept) > 2:
         figure = _panels(table, [(name, (each,)) for name in kept for each in swept], len(swept), _points)
     elif len(swept) == 1:

@@ -1,61 +1,101 @@
 """Reads what a sweep left: its rows, between what they lie, which runs never reached an event."""
 
-import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.dataset as ds
 import pyarrow.parquet as pq
+from fsspec.implementations.local import LocalFileSystem
+from numpy.typing import NDArray
+from pyarrow.fs import FSSpecHandler, PyFileSystem
 
 from .quantities import display
 from .store import KEY, OF_ONE_FILE, RUNS, TRAJECTORIES, chunk_files, different, misplaced, opened
 
+AT_ONCE = 2**16
+"""Rows that are worked on at a time."""
+LISTED = 10
+"""Numbers of runs, or of chunks, that are told."""
 
-def load(folder: str | os.PathLike[str], what: str = RUNS) -> pa.Table:
+
+def load(folder: str | os.PathLike[str], what: str = RUNS, check: bool = True) -> ds.Dataset:
     """The results of a finished sweep: a row a run, in their order; or the trajectories, a row a point of time.
 
-    The metadata is what all files share: the study, versions, the FMU's SHA-256, as JSON. A file alone, or what is
-    there of a sweep that was ended, is plain Parquet: pandas.read_parquet(folder / "runs").
+    A pyarrow dataset: nothing is read but the first file until rows are asked for, by `to_table` or, where they are
+    too many for memory, `to_batches`, each with `columns` and `filter`; `to_table().to_pandas()` wants pandas. Only
+    the files that may have what a filter of `run` asks for are opened.
+
+    The metadata of its schema is what all files share: the study, versions, the FMU's SHA-256, as JSON. A file alone,
+    or what is there of a sweep that was ended, is plain Parquet: pandas.read_parquet(folder / "runs").
 
     Args:
         folder: of the sweep.
         what: runs or trajectories.
+        check: wherever rows of a file are asked for read all of it, and compare its checksum, its study and its
+            number: ValueError where they are others. Without, only the parts that are asked for are read.
 
     Raises:
         FileNotFoundError: there is no sweep.
-        ValueError: it is not finished; a file is damaged or of another sweep; it kept no trajectories.
+        ValueError: it is not finished; its first file is damaged; it kept no trajectories.
     """
     if what not in (RUNS, TRAJECTORIES):
         raise ValueError(f"what = {what!r}: must be one of {RUNS}, {TRAJECTORIES}")
     folder = Path(folder)
-    files = chunk_files(folder, RUNS)
-    if not files:
+    numbers = {int(path.stem) for path in chunk_files(folder, RUNS)}
+    if not numbers:
         raise FileNotFoundError(f"{folder}: no sweep is there")
-    about = _checked(files[0], {})[0]
-    chunks = -(-about["runs"] // about["chunk"])
-    if len(files) != chunks:
-        raise ValueError(f"{folder}: {len(files)} of {chunks} chunks are there: finish it with the same command")
+    about, _ = _checked(_file(folder, RUNS, min(numbers)), {})
+    chunks = range(-(-about["runs"] // about["chunk"]))
+    if missing := [number for number in chunks if number not in numbers]:
+        raise ValueError(
+            f"{folder}: {len(numbers)} of {len(chunks)} chunks are there, not {_listed(missing)}: "
+            "finish it with the same command"
+        )
     if what not in about["files"]:
         raise ValueError(f"{folder}: the sweep kept no trajectories")
-    tables = []
-    for path in files:
-        there, content = _checked(folder / what / path.name, about)
-        tables.append(_table(path, content))
-        assert tables[-1].num_rows == there["rows"]
+    _, content = _checked(_file(folder, what, 0), about)
     shared = {name: value for name, value in about.items() if name not in OF_ONE_FILE}
-    return pa.concat_tables(tables).replace_schema_metadata({KEY: json.dumps(shared)})
+    schema = pq.read_schema(pa.BufferReader(content)).with_metadata({KEY: json.dumps(shared)})
+    files = PyFileSystem(_Checked(shared) if check else FSSpecHandler(LocalFileSystem()))
+    form = ds.ParquetFileFormat()
+    parts = [
+        form.make_fragment(str(_file(folder, what, number)), files, _runs_of(number, about["chunk"]))
+        for number in chunks
+    ]
+    return ds.FileSystemDataset(parts, schema, form, files)
 
 
-def _table(path: Path, content: bytes) -> pa.Table:
-    try:
-        return pq.read_table(io.BytesIO(content)).replace_schema_metadata(None)
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: is none that a sweep wrote: remove it; the same command makes it anew") from error
+class _Checked(FSSpecHandler):  # type: ignore[misc]
+    """Gives a file to whoever reads it when all of it is as it was written, and is of that sweep."""
+
+    def __init__(self, about: Mapping[str, Any]) -> None:
+        super().__init__(LocalFileSystem())
+        self.about = about
+
+    def open_input_file(self, path: str) -> pa.BufferReader:
+        return pa.BufferReader(_checked(Path(path), self.about)[1])
+
+
+def _file(folder: Path, what: str, number: int) -> Path:
+    return folder / what / f"{number:05}.parquet"
+
+
+def _runs_of(chunk: int, size: int) -> pc.Expression:
+    """What is known of the rows of a chunk, so that a filter of runs need not open it."""
+    run = pc.field("run")
+    return (run >= chunk * size) & (run < (chunk + 1) * size)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers[:LISTED])) + (", ..." if len(numbers) > LISTED else "")
 
 
 def _checked(path: Path, about: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
@@ -72,6 +112,29 @@ def _checked(path: Path, about: Mapping[str, Any]) -> tuple[dict[str, Any], byte
     raise ValueError(f"{path}: is missing; the same command makes it anew")
 
 
+# ---- what they come to
+
+
+def about_of(runs: ds.Dataset) -> dict[str, Any]:
+    """The metadata that all files of a sweep share; see `load`."""
+    about: dict[str, Any] = json.loads(runs.schema.metadata[KEY])
+    return about
+
+
+def batches(runs: ds.Dataset, columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
+    """Some rows at a time, in the order of the runs."""
+    batches: Iterator[pa.RecordBatch] = runs.to_batches(
+        columns=list(columns), batch_size=AT_ONCE, batch_readahead=1, fragment_readahead=1
+    )
+    return batches
+
+
+def numbers_of(rows: pa.RecordBatch | pa.Table, column: str) -> NDArray[Any]:
+    """A column as numpy has it: NaN where there is nothing."""
+    values: NDArray[Any] = rows[column].to_numpy(zero_copy_only=False)
+    return values
+
+
 class Extreme(NamedTuple):
     """The least and the greatest of a column, in its display unit, and the runs that they are of."""
 
@@ -84,23 +147,55 @@ class Extreme(NamedTuple):
     greatest_run: dict[str, Any]
 
 
-def extremes(folder: str | os.PathLike[str]) -> list[Extreme]:
-    """Between what the columns of a finished sweep lie; of those that have a value at all. Raises as `load` does."""
+class Unreached(NamedTuple):
+    """An event that did not happen in some of the runs that were not refused."""
+
+    event: str
+    runs: int
+    """How many."""
+    first: list[int]
+    """The numbers of the first ten of them."""
+
+
+class Overview(NamedTuple):
+    """What the rows of a sweep come to."""
+
+    extremes: list[Extreme]
+    """Of the columns that have a value at all."""
+    unreached: list[Unreached]
+    """Of the events that some run did not reach."""
+
+
+def overview(folder: str | os.PathLike[str]) -> Overview:
+    """Between what the columns of a finished sweep lie, and what never happened: in one go over its rows, of which
+    some are in memory at a time. Raises as `load` and what it gives do.
+    """
     runs = load(folder)
-    about = json.loads(runs.schema.metadata[KEY])
-    found = []
-    for name in about["kept"]:
-        values = runs[name].to_numpy()
-        if np.isnan(values).all():
-            continue
-        shown, factor = display(name)
-        places = int(np.nanargmin(values)), int(np.nanargmax(values))
-        (low, low_run), (high, high_run) = (
-            (float(values[i]) * factor, dict(_shown(each, runs[each][i].as_py()) for each in about["swept"]))
-            for i in places
-        )
-        found.append(Extreme(name, shown, low, low_run, high, high_run))
-    return found
+    about = about_of(runs)
+    swept, kept = about["swept"], about["kept"]
+    least: dict[str, _Value] = {}
+    greatest: dict[str, _Value] = {}
+    missed = {name: Unreached(name, 0, []) for name in json.loads(about["study"])["keep"].get("events", {})}
+    for rows in batches(runs, ["run", *swept, *kept, "error"]):
+        for name in kept:
+            values = numbers_of(rows, name)
+            if not np.isnan(values).all():
+                low, high = (_value(rows, int(i), name, swept) for i in (np.nanargmin(values), np.nanargmax(values)))
+                least[name] = min(least.get(name, low), low, key=_VALUE)  # of equal ones the first
+                greatest[name] = max(greatest.get(name, high), high, key=_VALUE)
+        for name, sofar in missed.items():
+            missed[name] = _missed(rows, sofar)
+    extremes = [Extreme(name, display(name)[0], *least[name], *greatest[name]) for name in kept if name in least]
+    return Overview(extremes, [each for each in missed.values() if each.runs])
+
+
+_Value: TypeAlias = tuple[float, dict[str, Any]]
+"""In its display unit, and the swept parameters of its run."""
+_VALUE = itemgetter(0)
+
+
+def _value(rows: pa.RecordBatch, i: int, name: str, swept: Sequence[str]) -> _Value:
+    return rows[name][i].as_py() * display(name)[1], dict(_shown(each, rows[each][i].as_py()) for each in swept)
 
 
 def _shown(name: str, value: Any) -> tuple[str, Any]:
@@ -109,11 +204,9 @@ def _shown(name: str, value: Any) -> tuple[str, Any]:
     return (f"{name} [{unit}]", value * factor) if factor != 1.0 else (name, value)
 
 
-def unreached(folder: str | os.PathLike[str]) -> dict[str, list[int]]:
-    """Event -> the numbers of the runs that never reached it, of the runs that were not refused. Raises as `load`."""
-    runs = load(folder)
-    about = json.loads(runs.schema.metadata[KEY])
-    made = np.array([each is None for each in runs["error"].to_pylist()])
-    events = json.loads(about["study"])["keep"].get("events", {})
-    missed = {name: np.isnan(runs[f"{name}.time"].to_numpy()) & made for name in events}
-    return {name: runs["run"].to_numpy()[where].tolist() for name, where in missed.items() if where.any()}
+def _missed(rows: pa.RecordBatch, sofar: Unreached) -> Unreached:
+    """With those of these rows, too."""
+    nothing = rows[f"{sofar.event}.time"].is_null()
+    found = rows["run"].filter(pc.and_(nothing, rows["error"].is_null()))
+    first = found[: LISTED - len(sofar.first)].to_pylist()
+    return Unreached(sofar.event, sofar.runs + len(found), sofar.first + first)
