@@ -63,6 +63,7 @@ OF_VALUES = (
     "must be a finite number", "must be greater than 0", "must not be negative", "must be from ", "must be one of ",
     "must be 0 ", "must be the same where both are set", "must not be above", "must not need more than",
     "must not fall below", "must stay a finite number", "must lead to finite inputs", "must slide", "must be off",
+    "must not drive",
 )  # fmt: skip
 
 

@@ -101,6 +101,21 @@ def test_splitting_takes_any_drag(density: float) -> None:
     assert 0.5 <= end.x <= 0.73
 
 
+def test_splitting_warns_where_drag_and_friction_stop_at_once_what_a_thruster_drives() -> None:
+    """The thruster spins it up against a rotational drag 1600 times too steep for the sub-step, in which friction stops
+    what that leaves: at the ends of the sub-steps there is no spin to be seen, of sqrt(moment/d) = 1.2 rad/s.
+    """
+    craft = Craft(
+        mass=1322.0, inertia=0.195, length=14.67, air_density=884.0, drag_center_fraction=0.0, steering_force=2.4e5,
+        rotational_drag=0.106, skirt_friction=0.127,
+    )  # fmt: skip
+    split, h = method("splitting"), 2.9e-4
+    made = advance(State(vx=0.05), Controls(0.0, 0.426), craft, 16 * h, Settings(h, split))
+    steady = math.sqrt(0.426 * craft.thruster_moment / craft.spin_drag_factor)
+    assert abs(made.state.yaw_rate) < 1e-3 * steady
+    assert made.stability > 100.0 * split.stability_limit
+
+
 extreme_crafts = st.builds(
     Craft,
     mass=numbers(1e-3, 1e6),

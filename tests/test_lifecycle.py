@@ -28,6 +28,7 @@ from hovercraft_fmu.fmu.interface import (
 )
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
+from hovercraft_fmu.model.integrators import INTEGRATORS, Integrator, integrator_number
 from hovercraft_fmu.model.observation import observe_action, observe_motion
 from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
@@ -254,6 +255,51 @@ def test_all_flavours_refuse_a_step_whose_watched_values_overflow(name: str, bot
         f"{name} = inf after 0.0 s: must stay a finite number; the step was refused and the state of 0.0 s stands; "
         f"the motion is too fast for sub-steps of {step!r} s: set a smaller step_size"
     ]
+
+
+@pytest.mark.parametrize("method", INTEGRATORS, ids=lambda method: method.name)
+@pytest.mark.parametrize(
+    ("name", "value", "beside"),
+    [
+        ("wind.y", -1e200, {"wind.x": 3.0}),
+        ("external.force.x", 1e308, {}),
+        ("external.force.y", -1e200, {"drag_coefficient": 0.0, "mass": 1e-200, "inertia": 1e-200}),
+        ("external.moment", 1e308, {"external.force.x": 5.0}),
+    ],
+)
+def test_all_flavours_name_an_input_that_no_step_helps(
+    name: str, value: float, beside: dict[str, float], method: Integrator, both: list[tuple[Any, list[str]]]
+) -> None:
+    """Drag at the speed that it drives the craft to is faster than 1e-12 s: to ask for shorter steps would be a lie."""
+    for instance, _ in both:
+        instance.setInteger([reference("integrator")], [integrator_number(method.name)])
+        for each, number in (beside | {name: value}).items():
+            instance.setReal([reference(each)], [number])
+        start(instance)
+        before = get(instance, *STATES)
+        with pytest.raises(FMICallException):
+            instance.doStep(0.0, 1.0)
+        assert get(instance, *STATES) == before
+    (_, ours), (_, said) = both
+    assert ours == said
+    assert said == [
+        f"{name} = {value!r}: must not drive the craft so fast that even sub-steps of 1e-12 s are too long; the step "
+        "was refused and the state of 0.0 s stands"
+    ]
+
+
+@pytest.mark.parametrize("value", [1e20, -1e20])
+def test_an_input_that_a_shorter_step_would_follow_is_not_blamed(
+    value: float, both: list[tuple[Any, list[str]]]
+) -> None:
+    for instance, _ in both:
+        put(instance, external__force__x=value)
+        start(instance)
+        with pytest.raises(FMICallException):
+            instance.doStep(0.0, 1.0)
+    (_, ours), (_, said) = both
+    assert ours == said
+    assert said[-1].endswith("the motion is too fast for sub-steps of 0.001 s: set a smaller step_size")
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ from hovercraft_fmu.studies.extremes import (
     RK4,
     SAMPLINGS,
     SILENT,
+    WARNED,
     Batch,
     Judged,
     advanced,
@@ -149,17 +150,14 @@ def test_whatever_is_drawn_has_a_verdict(seed: int, substeps: int, sampling: str
 def test_where_the_reference_needs_finer_steps_there_is_a_verdict() -> None:
     """A thruster turns a craft that is easy to turn, against a rotational drag 1600 times too steep for the sub-step.
 
-    RK4 leaves the numbers at a 32nd of it, too. Splitting is stopped again in every sub-step, and warns of nothing: the
-    bound is one that promises nothing.
+    RK4 leaves the numbers at a 32nd of it, too. Splitting is stopped again in every sub-step, and warns.
     """
     craft = Crafts(mass=1322.0, inertia=0.195, length=14.67, air_density=884.0, drag_center_fraction=0.0,
                    steering_force=2.4e5, rotational_drag=0.106, skirt_friction=0.127)  # fmt: skip
     runs = made(craft, Controls(0.0, 0.426, 0.0), State(vx=0.05), np.full(1, 2.9e-4), 16)
     assert np.isnan(advanced(runs, RK4, runs.start, 16, 32)[0].yaw_rate)
     judged = judge(runs, [method for method in FIXED if method.name == "splitting"])["splitting"]
-    assert np.isfinite(judged.error)
-    assert judged.verdict == ACCURATE
-    assert judged.bound > 1.0
+    assert judged.verdict == WARNED
 
 
 @pytest.mark.parametrize("name", ["drag_implicit", "splitting"])

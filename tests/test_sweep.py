@@ -229,6 +229,20 @@ def test_a_failed_craft_of_a_batch_leaves_the_others(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.usefixtures("fleet")
+def test_the_batch_names_an_input_that_no_step_helps_as_the_fmu_does(native_fmu: Path, tmp_path: Path) -> None:
+    study = but(
+        set={"step_size": 0.1}, stop_time=1.0,
+        sweep={"integrator": [method.name for method in INTEGRATORS], "external.force.x": [-1e308, 1e12, 1.0]},
+    )  # fmt: skip
+    sweep(study, native_fmu, workers=1, output=tmp_path / "fmu")
+    sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
+    assert bits(load(tmp_path / "batch")).equals(bits(load(tmp_path / "fmu")))
+    errors = [row["error"] for row in rows(load(tmp_path / "batch"))]
+    assert all("external.force.x = -1e+308: must not drive the craft" in error for error in errors[::3])
+    assert not any("must not drive" in error for error in [*errors[1::3], *errors[2::3]] if error)
+
+
 def test_the_batch_warns_as_the_fmu_does(fmu: Path, tmp_path: Path) -> None:
     study = but(
         set=COARSE | {"drag_center_fraction": 0.0},

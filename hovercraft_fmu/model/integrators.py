@@ -288,9 +288,10 @@ def splitting(state: State, controls: Controls, craft: Craft, h: float, n: int) 
     shared by the sway of the craft, 1/(m*M) of it, and its yaw rate, x_d/(I*M).
 
     A force from outside, turned into the body frame at the held heading, is a part of T and of the side force, a moment
-    one of the turn. Rotational drag, -d*r*|r|, is r/(1 + h*d*|r|/(2*I)) before and after, which is exact. Friction is
-    an implicit step after all that (and after the half one, so that a craft that it holds stays at rest): that lowers
-    the order to 1.
+    one of the turn. Rotational drag, -d*r*|r|, is r/(1 + h*d*|r|/(2*I)) before and after, which is exact; its
+    rate is watched where each begins: the second may stop what the moment of this sub-step has driven. Friction is an
+    implicit step after all that (and after the half one, so that a craft that it holds stays at rest): that lowers the
+    order to 1.
     """
     drag_at = drag_function(craft)
     rubbed = friction_function(craft, h) if craft.rubs else None
@@ -358,14 +359,15 @@ def splitting(state: State, controls: Controls, craft: Craft, h: float, n: int) 
         vx = vx + (c * gain_u - s * gain_v)
         vy = vy + (s * gain_u + c * gain_v)
         yaw_rate = yaw_rate + gain_r
+        driven = abs(yaw_rate)
         if spins:
-            yaw_rate = yaw_rate / (1.0 + slowing * abs(yaw_rate))
+            yaw_rate = yaw_rate / (1.0 + slowing * driven)
         if rubbed:
             vx, vy, yaw_rate = rubbed(vx, vy, yaw_rate)
         x = x + half * vx
         y = y + half * vy
         heading = heading + half * yaw_rate
-        rate = (middle if middle > kq else kq) * drag_rate + max(begun, abs(yaw_rate)) * spin_rate
+        rate = (middle if middle > kq else kq) * drag_rate + max(begun, driven) * spin_rate
         if rate > most:
             most = rate
         if yaw_rate > right:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from .craft import Craft
 from .dynamics import Controls, State
-from .integrators import INTEGRATORS, UNIT, Integrate, Integrator, Stretch, adaptive
+from .integrators import INTEGRATORS, MIN_STEP, UNIT, Integrate, Integrator, Stretch, adaptive
 
 MAX_SUBSTEPS = 10**9
 """Of one communication step: half an hour of computing, or a slip of the decimal point."""
@@ -172,3 +172,22 @@ def _refuse_non_finite(state: State, h: float) -> None:
         value = getattr(state, name)
         if not math.isfinite(value):
             raise NonFiniteError(name, value, h)
+
+
+def too_strong(controls: Controls, craft: Craft) -> str | None:
+    """The first input without limits that no step helps, as it drives the craft too fast; None where there is none.
+
+    A force F leads to the air speed q = sqrt(F/k), a moment to that of a force at the craft's length. Where drag there
+    is faster than the shortest step, h*k*q*`drag_rate` > 1, no method follows. (Without drag k is taken as 1: there a
+    step helps even less.)
+    """
+    k = craft.drag_factor or 1.0
+    rate = MIN_STEP * craft.drag_rate * k
+    speeds = {
+        "wind_x": abs(controls.wind_x),
+        "wind_y": abs(controls.wind_y),
+        "external_force_x": math.sqrt(abs(controls.external_force_x) / k),
+        "external_force_y": math.sqrt(abs(controls.external_force_y) / k),
+        "external_moment": math.sqrt(abs(controls.external_moment) / craft.length / k),
+    }
+    return next((name for name, speed in speeds.items() if rate * speed > 1.0), None)

@@ -25,7 +25,7 @@ from ..fmu.interface import (
 from ..host.fleet import Array, Crafts, advance_fleet, observe_fleet, refusals
 from ..host.ramps import slopes
 from ..model.dynamics import Controls, State
-from ..model.subcycling import NonFiniteError, Settings, meant_step
+from ..model.subcycling import NonFiniteError, Settings, meant_step, too_strong
 from .engines import SETTINGS, Plan, Ran, empty, settings_of
 from .quantities import Samples
 from .timeline import Leg, merged
@@ -125,11 +125,15 @@ class _Batch:
             last = Controls(*(start + step * rate for start, rate in zip(first, rates, strict=True)))
         fleet = advance_fleet(self._states, first, self._crafts, step, self._settings, rates, proposed=self._proposed)
         self._states, self._proposed = fleet.states, fleet.proposed
-        for i, why in fleet.refused.items():
-            self._errors.setdefault(i, _said(why, leg.time))
         stability, rotation = fleet.stability, fleet.rotation
+        for i, why in fleet.refused.items():
+            if i not in self._errors:
+                told = self._too_strong(i, last, leg) if isinstance(why, ArithmeticError) else ""
+                self._errors[i] = told or _said(why, leg.time)
         for i in np.flatnonzero(~(np.isfinite(stability) & np.isfinite(rotation))).tolist():
-            self._errors.setdefault(i, _watched(stability[i].item(), rotation[i].item(), self._settings, leg))
+            if i not in self._errors:
+                told = self._too_strong(i, last, leg)
+                self._errors[i] = told or _watched(stability[i].item(), rotation[i].item(), self._settings, leg)
         self._stability = np.maximum(self._stability, fleet.stability)
         self._rotation = np.maximum(self._rotation, fleet.rotation)
         self._substeps += fleet.substeps
@@ -137,6 +141,18 @@ class _Batch:
         if rates:
             self._look_for_held(last)
         return last
+
+    def _too_strong(self, i: int, controls: Controls, leg: Leg) -> str:
+        """Of a run that no step helps, as an input drives the craft too fast; '' where none does."""
+        held: Any = (np.broadcast_to(value, self._held.shape)[i].item() for value in controls)
+        own = Controls(*held)
+        field = too_strong(own, self._crafts.one(i))
+        if not field:
+            return ""
+        return (
+            f"{INPUTS[Controls._fields.index(field)]} = {getattr(own, field)!r}: must not drive the craft so fast that "
+            f"even sub-steps of 1e-12 s are too long; the step was refused and the state of {leg.time!r} s stands"
+        )
 
     def _look_for_held(self, controls: Controls) -> None:
         for value, limit in zip(controls[:3], self._saturated(controls), strict=True):

@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 from ...model.craft import Craft, check_parameter
 from ...model.dynamics import Controls, State, saturate
 from ...model.error_estimate import ON, Companion, accompany, check_error_estimate, estimated_error, is_lost, watched
-from ...model.integrators import Integrator, integrator
+from ...model.integrators import Integrator, StepTooSmallError, integrator
 from ...model.observation import observe_action, observe_motion
 from ...model.subcycling import (
     NonFiniteError,
@@ -16,6 +16,7 @@ from ...model.subcycling import (
     check_step_size,
     check_tolerance,
     meant_step,
+    too_strong,
 )
 from ..interface import (
     ACTION,
@@ -81,10 +82,14 @@ class HovercraftSlave(Slave):
         step_size = meant_step(time, step_size, self._start_time, self._settings.step_size)
         try:
             stretch = advance(self._state, controls, craft, step_size, self._settings, proposed=self._proposed)
-        except NonFiniteError as error:
+        except (NonFiniteError, StepTooSmallError) as error:
+            self._refuse_input(controls, craft)
+            if isinstance(error, StepTooSmallError):
+                raise
             self._refuse_motion(error)
         state, n, stability, rotation, proposed = stretch
         if not (stability < math.inf and rotation < math.inf):
+            self._refuse_input(controls, craft)
             self._refuse_watched(stability, rotation)
         if self._companion:
             beside = accompany(self._companion, controls, craft, step_size, self._settings)
@@ -157,6 +162,15 @@ class HovercraftSlave(Slave):
         if not self._integers[WARNED] & bit:
             self._integers[WARNED] |= bit
             self.log(f"{message} (said once)", Fmi2Status.warning)
+
+    def _refuse_input(self, controls: Controls, craft: Craft) -> None:
+        """Where no step helps, as an input drives the craft too fast."""
+        if field := too_strong(controls, craft):
+            name = INPUTS[Controls._fields.index(field)]
+            raise ValueError(
+                f"{name} = {getattr(controls, field)!r}: must not drive the craft so fast that even sub-steps of "
+                f"1e-12 s are too long; the step was refused and the state of {self._time!r} s stands"
+            )
 
     def _refuse_motion(self, error: NonFiniteError) -> NoReturn:
         name = STATES[State._fields.index(error.component)]

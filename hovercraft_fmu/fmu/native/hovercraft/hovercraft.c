@@ -204,10 +204,23 @@ static enum verdict refuse_motion(struct instance *instance, const struct stretc
                         stretch->substep);
 }
 
+/* An input that no step helps. */
+static enum verdict refuse_input(struct instance *instance, const struct controls *controls, unsigned i)
+{
+    double values[INPUT_COUNT];
+    memcpy(values, controls, sizeof values);
+    return instance_say(instance, DISCARDED,
+                        "%s = %r: must not drive the craft so fast that even sub-steps of 1e-12 s are too long; the "
+                        "step was refused and the state of %r s stands",
+                        VARIABLES[INPUTS[i]].name, values[i], instance->now.time);
+}
+
 static enum verdict refuse_step(struct instance *instance, enum outcome outcome, double step,
-                                const struct stretch *stretch)
+                                const struct stretch *stretch, const struct controls *controls,
+                                const struct craft *craft)
 {
     const struct settings *settings = &instance->now.model.settings;
+    const unsigned input = kernel_too_strong(controls, craft);
     if (outcome == TOO_MANY_SUBSTEPS && settings->integrator == ADAPTIVE)
         return instance_say(instance, DISCARDED,
                             "communication step = %r s: must not need more than 10^8 sub-steps to meet tolerance = %r; "
@@ -217,6 +230,8 @@ static enum verdict refuse_step(struct instance *instance, enum outcome outcome,
         return instance_say(instance, DISCARDED,
                             "communication step = %r s: must not need more than 10^9 sub-steps of step_size = %r s",
                             step, settings->step_size);
+    if (input < INPUT_COUNT)
+        return refuse_input(instance, controls, input);
     if (outcome == STEP_TOO_SMALL)
         return instance_say(instance, DISCARDED,
                             "step = %r s: must not fall below 1e-12 s, nor below what a double can tell at its time, to meet "
@@ -226,12 +241,16 @@ static enum verdict refuse_step(struct instance *instance, enum outcome outcome,
 }
 
 /* What is watched over a step may overflow where the motion just does not. */
-static enum verdict check_watched(struct instance *instance, double stability, double rotation)
+static enum verdict check_watched(struct instance *instance, const struct stretch *stretch,
+                                  const struct controls *controls, const struct craft *craft)
 {
+    const double stability = stretch->stability, rotation = stretch->rotation, time = instance->now.time;
     const bool turns = !isfinite(rotation);
-    const double time = instance->now.time;
     if (isfinite(stability) && !turns)
         return FINE;
+    const unsigned input = kernel_too_strong(controls, craft);
+    if (input < INPUT_COUNT)
+        return refuse_input(instance, controls, input);
     return instance_say(instance, DISCARDED,
                         "%s = %r after %r s: must stay a finite number; the step was refused and the state of %r s "
                         "stands; the motion is too fast for sub-steps of %r s: set a smaller step_size",
@@ -399,8 +418,10 @@ static enum verdict step_on(struct instance *instance, struct interval *interval
         inquiry.start = drive.start = inputs_at(&inquiry, 0.0);
     }
     const enum outcome outcome = kernel_advance(&m->state, &drive, &craft, step, &m->settings, m->proposed, &stretch);
-    if (outcome != ADVANCED)
-        return refuse_step(instance, outcome, step, &stretch);
+    if (outcome != ADVANCED) {
+        end = instance->services.ask ? inputs_of(now) : end;
+        return refuse_step(instance, outcome, step, &stretch, &end, &craft);
+    }
     if (m->estimates) {
         companion = m->companion;
         kernel_accompany(&companion, &drive, &craft, step, &m->settings, &stretch);
@@ -409,7 +430,7 @@ static enum verdict step_on(struct instance *instance, struct interval *interval
     if (instance->services.ask)
         end = inputs_at(&inquiry, step);
     if (instance_check_asked(instance, interval) == REFUSED ||
-        check_watched(instance, stretch.stability, stretch.rotation) == REFUSED)
+        check_watched(instance, &stretch, &end, &craft) == REFUSED)
         return REFUSED;
     if (m->estimates)
         m->companion = companion;

@@ -1,6 +1,7 @@
 #include "kernel.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "logarithm.h"
 #include "root.h"
@@ -783,14 +784,15 @@ static ALWAYS_INLINE struct stretch splitting_as(enum drag_kind kind, unsigned b
         z.vx = z.vx + (c * surge - s * sway);
         z.vy = z.vy + (s * surge + c * sway);
         z.yaw_rate = z.yaw_rate + yaw;
+        const double driven = fabs(z.yaw_rate);
         if (spins)
-            z.yaw_rate = z.yaw_rate / (1.0 + slowing * fabs(z.yaw_rate));
+            z.yaw_rate = z.yaw_rate / (1.0 + slowing * driven);
         if (friction.rubs)
             rub(&friction, &z.vx, &z.vy, &z.yaw_rate);
         z.x = z.x + half * z.vx;
         z.y = z.y + half * z.vy;
         z.heading = z.heading + half * z.yaw_rate;
-        watch_loads(&watch, f, kind, then > kq ? then : kq, larger(begun, fabs(z.yaw_rate)));
+        watch_loads(&watch, f, kind, then > kq ? then : kq, larger(begun, driven));
         watch_yaw_rate(&watch, z.yaw_rate);
         if (is_over(&z, i + 1))
             break;
@@ -1070,6 +1072,26 @@ enum outcome kernel_advance(const struct state *state, const struct drive *drive
     if (!substeps(communication_step, settings->step_size, &n, &h))
         return TOO_MANY_SUBSTEPS;
     return fixed(state, drive, craft, settings->integrator, h, n, stretch);
+}
+
+enum { CONTROLS = sizeof(struct controls) / sizeof(double) };
+
+unsigned kernel_too_strong(const struct controls *controls, const struct craft *craft)
+{
+    const double k = drag_factor(craft) > 0.0 ? drag_factor(craft) : 1.0, rate = MIN_STEP * drag_rate(craft) * k;
+    const struct controls reached = {
+        .wind_x = fabs(controls->wind_x),
+        .wind_y = fabs(controls->wind_y),
+        .external_force_x = square_root(fabs(controls->external_force_x) / k),
+        .external_force_y = square_root(fabs(controls->external_force_y) / k),
+        .external_moment = square_root(fabs(controls->external_moment) / craft->length / k),
+    };
+    double speeds[CONTROLS]; /* m/s: of the air */
+    unsigned i = 0;
+    memcpy(speeds, &reached, sizeof speeds);
+    while (i < CONTROLS && !(rate * speeds[i] > 1.0))
+        i++;
+    return i;
 }
 
 /* ---- error_estimate.py */

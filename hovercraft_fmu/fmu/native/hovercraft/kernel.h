@@ -134,6 +134,8 @@ HIDDEN double kernel_meant_step(double time, double step, double start_time, dou
 HIDDEN enum outcome kernel_advance(const struct state *state, const struct drive *drive, const struct craft *craft,
                                    double communication_step, const struct settings *settings, double proposed,
                                    struct stretch *stretch);
+/* The place among the controls of the first one without limits that no step helps; their number: there is none. */
+HIDDEN unsigned kernel_too_strong(const struct controls *controls, const struct craft *craft);
 /* The companion over the same communication step, which the craft itself has made; and what the craft did in it. */
 HIDDEN void kernel_accompany(struct companion *companion, const struct drive *drive, const struct craft *craft,
                              double communication_step, const struct settings *settings, const struct stretch *made);
