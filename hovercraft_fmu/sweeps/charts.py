@@ -4,23 +4,28 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.dataset as ds
 from numpy.typing import NDArray
 
 from ..drawing.figures import check_plot, new_figure, save
 from ..drawing.palette import SEA, SHADES
+from .cells import Plane, cells_of
 from .quantities import display
-from .reading import load
-from .store import KEY, TRAJECTORIES
+from .reading import about_of, batches, load, numbers_of
+from .store import TRAJECTORIES
 from .study import GRID
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+MOST_POINTS = 20_000
+"""Runs that are drawn one by one; of more, cells are drawn, whose runs are counted or their mean is taken."""
 PATHS = 1000
 """More of them are only ink."""
 PANEL = (4.4, 3.6)
@@ -36,7 +41,8 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
 
     With trajectories that have pose.x and pose.y: the paths. Else a panel for each column: a curve over one parameter;
     a heat map over the grid of two; points in the plane of two parameters of a Latin hypercube; with more parameters,
-    points over each.
+    points over each. Of more than 20 000 runs a picture shows cells: how many runs are in each, or over two parameters
+    their mean; of more than 1000 paths a thousand, evenly chosen. The picture says so.
 
     Raises:
         ValueError: see `load` and `check_plot`.
@@ -49,29 +55,60 @@ def plot_sweep(folder: str | os.PathLike[str], path: str | os.PathLike[str]) -> 
 
 def draw_sweep(folder: str | os.PathLike[str]) -> "Figure":
     """The picture of `plot_sweep`. Raises as it does."""
-    runs = load(folder).to_table()
-    about = json.loads(runs.schema.metadata[KEY])
-    study = json.loads(about["study"])
-    swept, kept = about["swept"], about["kept"]
-    table = {name: _shown(runs, name) for name in (*swept, *kept)}
-    if {"pose.x", "pose.y"} <= set(study["keep"].get("trajectory", {}).get("of", ())):
-        figure = _paths(load(folder, TRAJECTORIES).to_table(), table, swept[0])
-    elif len(swept) > 2:
-        figure = _panels(table, [(name, (each,)) for name in kept for each in swept], len(swept), _points)
-    elif len(swept) == 1:
-        figure = _panels(table, [(name, (swept[0],)) for name in kept], 2, _curve)
+    runs = load(folder)
+    about = about_of(runs)
+    made = sum(rows["error"].null_count for rows in batches(runs, ["error"]))
+    drawn = ""
+    if {"pose.x", "pose.y"} <= set(json.loads(about["study"])["keep"].get("trajectory", {}).get("of", ())):
+        figure = _paths(runs, load(folder, TRAJECTORIES), made)
+    elif about["runs"] > MOST_POINTS:
+        figure, drawn = _in_cells(runs, about)
     else:
-        way = _heat_map if study.get("sampling", {}).get("method", GRID) == GRID else _cloud
-        figure = _panels(table, [(name, tuple(swept)) for name in kept], 2, way)
-    failed = runs.num_rows - runs["error"].null_count
-    figure.suptitle(f"{about['name']}: {runs.num_rows} runs" + (f", {failed} failed" if failed else ""))
+        figure = _one_by_one(runs.to_table(), about)
+    failed = about["runs"] - made
+    figure.suptitle(f"{about['name']}: {about['runs']} runs" + (f", {failed} failed" if failed else "") + drawn)
     return figure
 
 
-def _shown(table: pa.Table, name: str) -> NDArray[np.float64]:
-    """A column in its display unit; NaN where there is nothing."""
-    values: NDArray[np.float64] = table[name].to_numpy().astype(np.float64)
-    return values * display(name)[1]
+def _one_by_one(rows: pa.Table, about: Mapping[str, Any]) -> "Figure":
+    swept = about["swept"]
+    ways: dict[int, Callable[..., None]] = {1: _curve, 2: _heat_map if _is_grid(about) else _cloud}
+    way = ways.get(len(swept), _points)
+
+    def draw(axes: "Axes", *columns: str) -> None:
+        way(axes, *(numbers_of(rows, name).astype(np.float64) * display(name)[1] for name in columns))
+
+    return _panels(_panel_names(about), len(swept), draw)
+
+
+def _in_cells(runs: ds.Dataset, about: Mapping[str, Any]) -> tuple["Figure", str]:
+    """And the rule that it is drawn by."""
+    from matplotlib.colors import LogNorm
+
+    panels, swept = _panel_names(about), about["swept"]
+    planes = [Plane(over[0], over[1], name) if len(over) > 1 else Plane(over[0], name, None) for name, *over in panels]
+    cells = dict(zip(panels, cells_of(runs, planes, swept if _is_grid(about) else ()), strict=True))
+    means = len(swept) == 2
+
+    def draw(axes: "Axes", *columns: str) -> None:
+        x, y, values = cells[columns]
+        scale = None if means else LogNorm(1.0, values[np.isfinite(values)].max(initial=10.0))
+        image = axes.pcolormesh(x, y, values, cmap=SHADES, norm=scale, rasterized=True)
+        figure: Figure = axes.figure  # type: ignore[assignment]
+        figure.colorbar(image, ax=axes, label="" if means else "runs in a cell")
+
+    shown = "mean of the runs" if means else "number of runs"
+    return _panels(panels, len(swept), draw), f"\nmore than {MOST_POINTS}: drawn in cells, its colour the {shown} in it"
+
+
+def _is_grid(about: Mapping[str, Any]) -> bool:
+    return bool(json.loads(about["study"]).get("sampling", {}).get("method", GRID) == GRID)
+
+
+def _panel_names(about: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Of each panel the column, and the parameters that it is drawn over."""
+    swept, kept = about["swept"], about["kept"]
+    return [(name, *swept) for name in kept] if len(swept) == 2 else [(name, each) for name in kept for each in swept]
 
 
 def _label(name: str) -> str:
@@ -79,21 +116,16 @@ def _label(name: str) -> str:
     return f"{name} [{shown}]" if shown else name
 
 
-def _panels(
-    table: Mapping[str, NDArray[np.float64]],
-    panels: Sequence[tuple[str, tuple[str, ...]]],
-    most: int,
-    draw: Callable[..., None],
-) -> "Figure":
-    """A panel for each: the column and the parameters that it is drawn over; at most so many in a line."""
-    columns = min(most, len(panels))
+def _panels(panels: Sequence[tuple[str, ...]], swept: int, draw: Callable[..., None]) -> "Figure":
+    """As many in a line as parameters are swept, two at least."""
+    columns = min(max(2, swept), len(panels))
     lines = -(-len(panels) // columns)
     size = (PANEL[0] * columns + 0.6, PANEL[1] * lines + 0.5)
     figure = new_figure(figsize=size, dpi=110, layout="constrained")
     grid = figure.subplots(lines, columns, squeeze=False)
-    for axes, (name, over) in zip(grid.flat, panels, strict=False):
+    for axes, (name, *over) in zip(grid.flat, panels, strict=False):
         axes.set_xlabel(_label(over[0]))
-        draw(axes, table[name], *(table[each] for each in over))
+        draw(axes, name, *over)
         axes.locator_params(axis="x", nbins=MOST_TICKS)
         if len(over) > 1:
             axes.set_ylabel(_label(over[1]))
@@ -134,27 +166,46 @@ def _cloud(axes: "Axes", values: NDArray[np.float64], x: NDArray[np.float64], y:
     figure.colorbar(dots, ax=axes)
 
 
-def _paths(trajectories: pa.Table, table: Mapping[str, NDArray[np.float64]], by: str) -> "Figure":
-    """Every path, its colour the first parameter that was swept."""
+def _paths(runs: ds.Dataset, trajectories: ds.Dataset, made: int) -> "Figure":
+    """The paths of the runs that were made, or some of them; their colour the first parameter that was swept."""
     from matplotlib.collections import LineCollection
 
-    numbers = trajectories["run"].to_numpy()
-    where = np.stack([trajectories[name].to_numpy() for name in ("pose.x", "pose.y")], axis=1)
-    starts = np.flatnonzero(np.diff(numbers, prepend=-1))
-    lines, runs = np.split(where, starts[1:]), numbers[starts]
-    chosen = np.unique(np.linspace(0, len(runs) - 1, min(PATHS, len(runs))).astype(int))
+    by = about_of(runs)["swept"][0]
+    chosen = _evenly(runs, made)
+    rows, points = _of(chosen, runs, by), _of(chosen, trajectories, "pose.x", "pose.y")
+    starts = np.flatnonzero(np.diff(numbers_of(points, "run"), prepend=-1))
+    lines = np.split(np.stack([numbers_of(points, name) for name in ("pose.x", "pose.y")], axis=1), starts[1:])
     figure = new_figure(figsize=(8.0, 6.0), dpi=110, layout="constrained")
     axes = figure.add_subplot()
-    paths = LineCollection([lines[i] for i in chosen], cmap=SHADES, linewidths=0.8, alpha=0.8)
-    paths.set_array(table[by][runs[chosen]])
+    paths = LineCollection(lines, cmap=SHADES, linewidths=0.8, alpha=0.8)
+    paths.set_array(numbers_of(rows, by) * display(by)[1])
     axes.add_collection(paths)
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m], downward")
-    if len(chosen) < len(runs):
+    if len(chosen) < made:
         axes.set_title(f"{len(chosen)} of the paths, evenly chosen")
     axes.grid(alpha=0.3)
     figure.colorbar(paths, ax=axes, label=_label(by))
     return figure
+
+
+def _of(chosen: NDArray[np.int64], rows: ds.Dataset, *columns: str) -> pa.Table:
+    """Those columns of those runs."""
+    wanted = pa.array(chosen)
+    every = batches(rows, ["run", *columns])
+    return pa.concat_tables(pa.Table.from_batches([each.filter(pc.is_in(each["run"], wanted))]) for each in every)
+
+
+def _evenly(runs: ds.Dataset, made: int) -> NDArray[np.int64]:
+    """The numbers of PATHS runs, of those that were made."""
+    wanted = np.unique(np.linspace(0, made - 1, min(PATHS, made)).astype(int))
+    found, before = [np.empty(0, np.int64)], 0
+    for rows in batches(runs, ["run", "error"]):
+        numbers = rows["run"].filter(rows["error"].is_null()).to_numpy()
+        here = wanted[(before <= wanted) & (wanted < before + len(numbers))]
+        found.append(numbers[here - before])
+        before += len(numbers)
+    return np.concatenate(found)
