@@ -20,7 +20,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -108,17 +108,20 @@ class C:
         folders = sorted(path for path in self.counts.iterdir() if path.is_dir())
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             for folder, exported in zip(folders, pool.map(self._exported, folders), strict=True):
-                for file, found in exported.items():
+                test = f"tests/{folder.name}.py"
+                for file, found in exported:
                     of_file = lines.setdefault(file, {})
                     for branch, was in _branches(file, found["branches"]):
                         taken[branch] = taken.get(branch, False) or was
                     for line, was in _lines(found["segments"]).items():
-                        of_file.setdefault(line, []).extend([f"tests/{folder.name}.py"] if was else [])
+                        tests = of_file.setdefault(line, [])
+                        if was and test not in tests:
+                            tests.append(test)
         (self.counts.parent / "c_lines.json").write_text(json.dumps(lines, indent=1, sort_keys=True))
         return taken
 
-    def _exported(self, folder: Path) -> dict[str, dict[str, Any]]:
-        """What llvm-cov has for each file of C that is ours, by its path from ROOT."""
+    def _exported(self, folder: Path) -> list[tuple[str, dict[str, Any]]]:
+        """What llvm-cov has for files of ours, by their path from ROOT; a file that is compiled in two places twice."""
         merged = folder / "merged.profdata"
         counts = [str(path) for path in folder.glob("*.profraw")]
         _run("llvm-profdata", "merge", "-sparse", "-failure-mode=all", *counts, "-o", str(merged))
@@ -127,14 +130,21 @@ class C:
             "llvm-cov", "export", "-skip-functions", "-skip-expansions", f"-instr-profile={merged}", *objects
         )
         files = json.loads(printed)["data"][0]["files"]
-        named = ((OURS.get(Path(each["filename"]).name), each) for each in files)
-        return {name: each for name, each in named if name}
+        named = ((_ours(Path(each["filename"])), each) for each in files)
+        return [(name, each) for name, each in named if name]
 
     @cached_property
     def _programs(self) -> list[Path]:
         """All that count, each once."""
         found = [path for path in self.objects.iterdir() if path.is_file()]
         return list({hashlib.sha256(path.read_bytes()).digest(): path for path in sorted(found)}.values())
+
+
+@cache
+def _ours(compiled: Path) -> str:
+    """The file of ours that it is a copy of, from ROOT; '' where it is none: tests make some that are wrong."""
+    name = OURS.get(compiled.name, "")
+    return name if name and compiled.is_file() and compiled.read_bytes() == (ROOT / name).read_bytes() else ""
 
 
 def _run(*command: str) -> str:

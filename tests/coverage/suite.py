@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -51,21 +52,30 @@ def run(parts: Sequence[type[Part]], files: Sequence[Path]) -> tuple[Taken, list
     for name in (".gitignore", "README.md"):
         shutil.copy(ROOT / "build" / name, tree / "build")
     made = [part(tree) for part in parts]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        ended = list(pool.map(lambda file: _tested(made, tree, file), files))
     taken: dict[Branch, bool] = {}
-    for part in made:
-        taken |= part.taken()
+    with tempfile.TemporaryDirectory(prefix="coverage-") as place, ThreadPoolExecutor(os.cpu_count()) as pool:
+        ended = list(pool.map(lambda file: _tested(made, tree, file, Path(place)), files))
+        for part in made:
+            taken |= part.taken()
     return taken, [file for file, well in zip(files, ended, strict=True) if not well]
 
 
-def _tested(parts: Sequence[Part], tree: Path, file: Path) -> bool:
-    """Whether that file has tests, and all passed; what they said is in RESULTS."""
+def _tested(parts: Sequence[Part], tree: Path, file: Path, place: Path) -> bool:
+    """Whether that file has tests, and all passed; what they said is in RESULTS, what they made in `place`."""
     added = {"PYTHONPATH": str(tree)}
     for part in parts:
         added |= part.environment(file)
     with (RESULTS / f"{file.stem}.txt").open("w") as said:
-        command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", str(file)]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-p",
+            "no:cacheprovider",
+            "--basetemp",
+            str(place / file.stem),
+            str(file),
+        ]
         done = subprocess.run(
             command, cwd=tree, env={**os.environ, **added}, stdout=said, stderr=said, stdin=subprocess.DEVNULL,
             check=False,
