@@ -1,6 +1,7 @@
 import math
 from dataclasses import asdict
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,6 +14,7 @@ from hovercraft_fmu.model.dynamics import (
     derivatives,
     kinetic_energy,
     loads,
+    over_zero,
     saturate,
 )
 from hovercraft_fmu.model.subcycling import Settings, advance
@@ -154,3 +156,10 @@ def test_without_drag_a_spinning_craft_goes_straight() -> None:
     # the velocity keeps its bits; the position is 10^4 additions of h*v
     assert (end.vx, end.vy, end.yaw_rate) == (3.0, -4.0, 100.0)
     assert (end.x, end.y) == pytest.approx((30.0, -40.0), rel=1e-11)
+
+
+@pytest.mark.parametrize("value", [1.0, -1.0, 5e-324, 0.0, -0.0, math.inf, -math.inf, math.nan])
+def test_over_zero_is_the_division_of_ieee_754(value: float) -> None:
+    with np.errstate(all="ignore"):
+        expected = np.float64(value) / np.float64(0.0)
+    assert over_zero(value) == expected or (math.isnan(over_zero(value)) and math.isnan(expected))

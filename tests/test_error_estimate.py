@@ -251,6 +251,16 @@ def test_a_stop_within_a_few_substeps_cannot_be_trusted(each_fmu: Path) -> None:
         assert messages == []
 
 
+@pytest.mark.parametrize("method", INTEGRATORS, ids=lambda each: each.name)
+def test_a_companion_that_cannot_go_on_is_lost_for_good(method: Integrator) -> None:
+    """Turned beyond all numbers; or, by the adaptive method, faster than it can follow."""
+    spinning, craft, how = State(heading=1.7e308, yaw_rate=1.7e308), Craft(drag_coefficient=0.0), Settings(1.0, method)
+    lost = accompany(Companion(spinning), Controls(), craft, 3.0, how)
+    assert all(map(math.isnan, lost.state))
+    assert repr(accompany(lost, Controls(), craft, 3.0, how)) == repr(lost)
+    assert estimated_error(spinning, lost, craft, method) == (LARGEST, LARGEST)
+
+
 def test_where_the_companion_alone_runs_away_the_motion_goes_on(each_fmu: Path) -> None:
     """A long, narrow craft that spins by half a turn a sub-step shows the air its bow or its stern at every one; its
     companion, by a quarter of a turn, its side at every other: there Euler's step is too long, and diverges.

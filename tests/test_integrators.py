@@ -305,6 +305,11 @@ def test_adaptive_says_where_it_cannot_go_on() -> None:
         advance(State(vx=1e6), NONE, hard, 1.0, Settings(1e-3, method("adaptive"), 1e-14))
 
 
+def test_adaptive_does_not_follow_a_spin_that_turns_by_a_radian_within_its_least_step() -> None:
+    with pytest.raises(StepTooSmallError, match=r"step = 9\S+e-14 s: must not fall below 1e-12 s"):
+        advance(State(yaw_rate=1e13), NONE, Craft(drag_coefficient=0.0), 1.0, Settings(1e-3, method("adaptive")))
+
+
 @pytest.mark.parametrize("each", INTEGRATORS, ids=lambda each: each.name)
 def test_what_is_watched(each: Any) -> None:
     """Coasting slows down, so the largest number is that of the first sub-step; the spin is without drag."""

@@ -180,6 +180,8 @@ def test_loads(craft_and_state: tuple[Craft, State], held: Controls, libm: Kerne
     assert libm.loads(state, held, craft) == expected
 
 
+HELD = Craft(mass=1.0, inertia=1e60, drag_coefficient=0.0, skirt_friction=1.0, gravity=1000.0, thrust_max=0.0)
+"""It loses 1 m/s a millisecond, and its spin next to nothing."""
 EXTREMES = {
     "overflow of the drag": (State(vx=1e150), Craft(), 0.1),
     "overflow of the position": (State(x=1.7e308, vx=1.7e308), Craft(drag_coefficient=0.0), 1.0),
@@ -187,7 +189,14 @@ EXTREMES = {
     "density without end": (State(vx=1.0), Craft(air_density=1e300, drag_coefficient=100.0), 0.1),
     "too many sub-steps": (State(), Craft(), 1e7),
     "a huge heading": (State(heading=-1e200, vx=1.0, yaw_rate=1.0), Craft(), 0.1),
-}
+    "the end of the world": (State(x=1.7e308, y=1.7e308), Craft(), 0.1),
+    "a spin too fast to follow": (State(yaw_rate=1e13), Craft(drag_coefficient=0.0), 0.1),
+    "turned beyond all numbers": (State(), Craft(inertia=1e-300, drag_center_fraction=0.0), 0.1),
+    "masses whose product is no number": (
+        State(vx=1.0, yaw_rate=1.0), Craft(mass=1e-200, inertia=1e-200, drag_coefficient=0.0), 0.01,
+    ),
+    "friction that takes all but the last bit": (State(vx=math.nextafter(1.0, 0.0), yaw_rate=1e-31), HELD, 0.001),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -196,9 +205,9 @@ def test_extremes_end_in_the_same_way(name: str, method: str, libm: Kernel) -> N
     if name == "too many sub-steps" and method == "adaptive":
         return  # it has no limit, and no sub-steps that would be cut
     state, craft, step = EXTREMES[name]
-    how = Settings(0.001, METHODS[method])
-    outcome, expected = _of_python(state, Controls(), craft, step, how)
-    found, made = libm.advance(state, Controls(), craft, step, how)
+    how, held = Settings(0.001, METHODS[method]), Controls(external_moment=1e308 if name.startswith("turned") else 0.0)
+    outcome, expected = _of_python(state, held, craft, step, how)
+    found, made = libm.advance(state, held, craft, step, how)
     assert found == outcome
     assert expected is None or made == expected
 

@@ -58,7 +58,9 @@ def test_impossible_substeps(bad: float) -> None:
         advance(State(), Controls(), Craft(), 1.0, Settings(bad))
 
 
-@pytest.mark.parametrize(("communication_step", "step_size"), [(1e6 + 1.0, 0.001), (1e300, 1e-300), (1.0, 1e-10)])
+@pytest.mark.parametrize(
+    ("communication_step", "step_size"), [(1e6 + 1.0, 0.001), (1e300, 1e-300), (1.0, 1e-10), (1e9 + 0.5, 1.0)]
+)
 def test_too_many_substeps_are_refused(communication_step: float, step_size: float) -> None:
     with pytest.raises(ValueError, match=r"10\^9"):
         substeps(communication_step, step_size)
@@ -96,6 +98,16 @@ def test_a_run_cut_anywhere_ends_on_time(steps: list[float]) -> None:
 def test_a_motion_out_of_range_is_refused(start: State) -> None:
     with pytest.raises(NonFiniteError, match="must stay a finite number"):
         advance(start, Controls(), Craft(), 0.1)
+
+
+def test_the_first_that_leaves_the_range_is_named() -> None:
+    with pytest.raises(NonFiniteError, match=r"x = inf after sub-steps of 1\.0 s"):
+        advance(State(x=1.7e308, vx=1.7e308), Controls(), Craft(drag_coefficient=0.0), 1.0, Settings(1.0))
+
+
+def test_any_finite_place_is_a_place() -> None:
+    """Where x + y is none: 'finite' is said of each number, not of their sum."""
+    assert advance(State(x=1.7e308, y=1.7e308), Controls(0.0), Craft(), 1.0, Settings(1.0)).state.x == 1.7e308
 
 
 def test_methods_have_names_and_numbers() -> None:

@@ -299,6 +299,14 @@ def test_the_friction_step_solves_its_equation(craft: Craft, state: State, h: fl
         assert radius * r * (1.0 + b / q) == pytest.approx(radius * state.yaw_rate, abs=1e-13 * size, rel=1e-11)
 
 
+def test_friction_that_takes_all_but_the_last_bit_leaves_next_to_nothing() -> None:
+    """Where its equation is hardest to solve, with a spin that it hardly brakes: whatever is left goes on ahead."""
+    craft = Craft(mass=1.0, inertia=1e60, gravity=1.0, skirt_friction=1.0)
+    vx, vy, yaw_rate = friction_function(craft, 1.0)(math.nextafter(1.0, 0.0), 0.0, 1e-31)
+    assert 0.0 <= vx <= 1e-16
+    assert (vy, yaw_rate) == (0.0, 1e-31)
+
+
 def test_what_friction_does_to_the_order() -> None:
     """First order stays; rk4 falls to the second where the craft comes to rest, splitting to the first, from smaller
     errors; adaptive follows its tolerance.
