@@ -2,6 +2,7 @@
 
 import errno
 import os
+import platform
 import re
 import shutil
 import tempfile
@@ -40,7 +41,7 @@ def written(path: Path) -> Iterator[Path]:
         except OSError as error:
             raise OSError(error.errno, error.strerror or str(error), str(path)) from error
         return
-    unfinished = target.with_name(f".{target.name}.{os.getpid()}")
+    unfinished = target.with_name(f".{target.name}.{platform.node()}.{os.getpid()}")  # a folder may be shared
     _unfinished.add(unfinished)
     try:
         _check_target(path)

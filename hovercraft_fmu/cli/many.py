@@ -67,9 +67,10 @@ def _studies() -> Iterable[str]:
 @click.option("--tls-cert", type=PathOf(path_type=Path), metavar="FILE.pem", help="Your certificate.")
 @click.option("--tls-key", type=PathOf(path_type=Path), metavar="FILE.pem", help="Its key.")
 @click.option(
-    "--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR",
-    help="Default: build/sweep/ and the study.",
+    "--output", type=PathOf(file_okay=False), metavar="DIR|ADDRESS",
+    help="A folder, or s3://bucket/folder and the like. Default: build/sweep/ and the study.",
 )  # fmt: skip
+@click.option("--part", metavar="K/N", help="Make the K-th of N parts alone, as 2/8; together they are the sweep.")
 @click.option("--overwrite", is_flag=True, help="Delete the results that are there, of this or another sweep, before.")
 @click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png|.svg|.pdf", help="Draw the results.")
 @json_option
@@ -77,7 +78,7 @@ def sweep(
     study: str,
     fmu: Path | None,
     kind: "Kind | None",
-    output: Path | None,
+    output: str | None,
     plot: Path | None,
     engine: str,
     tls_ca: Path | None,
@@ -114,6 +115,11 @@ def sweep(
         OUTPUT.print(f"{outcome.failed} failed; the first is {outcome.error}")
     if outcome.warned:
         OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
+    if outcome.missing:
+        OUTPUT.print(f"{outcome.missing} runs of the study are missing yet: of other parts")
+        if as_json:
+            print_json({**outcome._asdict(), "seconds": seconds})
+        return
     found = overview(outcome.folder)
     _print_extremes(found.extremes)
     for event, count, runs in found.unreached:

@@ -82,10 +82,10 @@ def _security(scheduler: Scheduler) -> Security | None:
 
 def _on(client: Any, job: Job, todo: Todo) -> Generator[Made, None, None]:
     everywhere = client.scatter(job, broadcast=True)
-    parts = iter(todo)
+    chunks = iter(todo)
 
     def submitted(count: int) -> list[Any]:
-        return [client.submit(make_chunk, everywhere, *part, pure=False) for part in islice(parts, count)]
+        return [client.submit(make_chunk, everywhere, chunk, pure=False) for chunk in islice(chunks, count)]
 
     waiting = distributed.as_completed(submitted(AHEAD * sum(client.nthreads().values())), loop=client.loop)
     try:

@@ -5,7 +5,6 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from operator import itemgetter
-from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -13,12 +12,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
-from fsspec.implementations.local import LocalFileSystem
 from numpy.typing import NDArray
 from pyarrow.fs import FSSpecHandler, PyFileSystem
 
+from .place import Place, place_of
 from .quantities import display
-from .store import KEY, OF_ONE_FILE, RUNS, TRAJECTORIES, chunk_files, different, misplaced, opened
+from .store import KEY, OF_ONE_FILE, RUNS, TRAJECTORIES, chunk_file, chunk_numbers, different, misplaced, opened
 
 AT_ONCE = 2**16
 """Rows that are worked on at a time."""
@@ -48,11 +47,11 @@ def load(folder: str | os.PathLike[str], what: str = RUNS, check: bool = True) -
     """
     if what not in (RUNS, TRAJECTORIES):
         raise ValueError(f"what = {what!r}: must be one of {RUNS}, {TRAJECTORIES}")
-    folder = Path(folder)
-    numbers = {int(path.stem) for path in chunk_files(folder, RUNS)}
+    place = place_of(folder)
+    numbers = set(chunk_numbers(place, RUNS))
     if not numbers:
         raise FileNotFoundError(f"{folder}: no sweep is there")
-    about, _ = _checked(_file(folder, RUNS, min(numbers)), {})
+    about, _ = _checked(place, chunk_file(RUNS, min(numbers)), {})
     chunks = range(-(-about["runs"] // about["chunk"]))
     if missing := [number for number in chunks if number not in numbers]:
         raise ValueError(
@@ -61,13 +60,13 @@ def load(folder: str | os.PathLike[str], what: str = RUNS, check: bool = True) -
         )
     if what not in about["files"]:
         raise ValueError(f"{folder}: the sweep kept no trajectories")
-    _, content = _checked(_file(folder, what, 0), about)
+    _, content = _checked(place, chunk_file(what, 0), about)
     shared = {name: value for name, value in about.items() if name not in OF_ONE_FILE}
     schema = pq.read_schema(pa.BufferReader(content)).with_metadata({KEY: json.dumps(shared)})
-    files = PyFileSystem(_Checked(shared) if check else FSSpecHandler(LocalFileSystem()))
+    files = PyFileSystem(_Checked(place, shared) if check else FSSpecHandler(place.store[0]))
     form = ds.ParquetFileFormat()
     parts = [
-        form.make_fragment(str(_file(folder, what, number)), files, _runs_of(number, about["chunk"]))
+        form.make_fragment(place.path(chunk_file(what, number)), files, _runs_of(number, about["chunk"]))
         for number in chunks
     ]
     return ds.FileSystemDataset(parts, schema, form, files)
@@ -76,16 +75,12 @@ def load(folder: str | os.PathLike[str], what: str = RUNS, check: bool = True) -
 class _Checked(FSSpecHandler):  # type: ignore[misc]
     """Gives a file to whoever reads it when all of it is as it was written, and is of that sweep."""
 
-    def __init__(self, about: Mapping[str, Any]) -> None:
-        super().__init__(LocalFileSystem())
-        self.about = about
+    def __init__(self, place: Place, about: Mapping[str, Any]) -> None:
+        super().__init__(place.store[0])
+        self.place, self.about = place, about
 
     def open_input_file(self, path: str) -> pa.BufferReader:
-        return pa.BufferReader(_checked(Path(path), self.about)[1])
-
-
-def _file(folder: Path, what: str, number: int) -> Path:
-    return folder / what / f"{number:05}.parquet"
+        return pa.BufferReader(_checked(self.place, path.removeprefix(self.place.path("")), self.about)[1])
 
 
 def _runs_of(chunk: int, size: int) -> pc.Expression:
@@ -98,18 +93,18 @@ def _listed(numbers: Sequence[int]) -> str:
     return ", ".join(map(str, numbers[:LISTED])) + (", ..." if len(numbers) > LISTED else "")
 
 
-def _checked(path: Path, about: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
+def _checked(place: Place, name: str, about: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     """The metadata and the content. Raises ValueError where it is damaged, elsewhere, or of another sweep."""
     with suppress(FileNotFoundError):
         try:
-            there, content = opened(path)
-            why = (different(there, about) if about else "") or misplaced(path, there)
+            there, content = opened(place, name)
+            why = (different(there, about) if about else "") or misplaced(name, there)
         except ValueError as error:
             why = str(error)
         if not why:
             return there, content
-        raise ValueError(f"{path}: {why}; the same command makes it anew")
-    raise ValueError(f"{path}: is missing; the same command makes it anew")
+        raise ValueError(f"{place}/{name}: {why}; the same command makes it anew")
+    raise ValueError(f"{place}/{name}: is missing; the same command makes it anew")
 
 
 # ---- what they come to

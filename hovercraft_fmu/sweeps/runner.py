@@ -5,15 +5,13 @@ import os
 import platform
 import re
 import uuid
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
-
-import numpy as np
 
 from .._version import __version__
 from ..building import default_fmu
@@ -23,7 +21,8 @@ from ..host import read_description
 from ..model.error_estimate import ON
 from ..simulation.fmu_run import own_starts
 from .engines import SETTINGS, Plan
-from .store import RUNS, TRAJECTORIES, Store, store
+from .place import Place, place_of
+from .store import RUNS, TRAJECTORIES, WHOLE, Part, Store, store
 from .study import Study, read_study
 from .timeline import timeline
 from .work import Job, Made
@@ -48,8 +47,10 @@ MOST_SUBSTEPS = 10**6
 class Outcome(NamedTuple):
     """What a sweep came to."""
 
-    folder: Path
+    folder: Path | str
+    """Or the address."""
     runs: int
+    """Of the part that was asked for."""
     new: int
     """Runs that were made now; the others were there."""
     failed: int
@@ -60,6 +61,8 @@ class Outcome(NamedTuple):
     """The first of the errors, with the number of its run."""
     spoiled: tuple[str, ...]
     """Files that were damaged, misplaced or of another sweep, and why: set aside and made anew."""
+    missing: int
+    """Runs of the study that are not there yet: of other parts."""
 
 
 @explains_keywords
@@ -72,6 +75,7 @@ def sweep(
     scheduler: str | None = None,
     tls: tuple[Path | None, Path | None, Path | None] = (None, None, None),
     output: str | os.PathLike[str] | None = None,
+    part: str | None = None,
     overwrite: bool = False,
     tell: Tell = lambda _: None,
 ) -> Outcome:
@@ -87,42 +91,56 @@ def sweep(
         workers: processes on this machine; by default one a processor. 1: this process.
         scheduler: address of a dask.distributed scheduler, as tcp://10.0.0.1:8786, whose workers have this package.
         tls: PEM files to reach a scheduler by tls://: the authority's certificate, one's own, its key.
-        output: folder of the results; by default build/sweep/ and the name of the study.
+        output: folder of the results, or an address as s3://bucket/folder of a store that fsspec knows; by default
+            build/sweep/ and the name of the study. Workers write there themselves.
+        part: k/n, as 2/8: make the k-th of n parts alone; each may be made anywhere, at any time, into the same output,
+            and all together are the sweep.
         overwrite: delete the results that are there, of this or another sweep, before.
         tell: see `Tell`.
 
     Raises:
-        ValueError: a bad study, FMU or argument; a folder with the results of another sweep, or one at work in it.
-        OSError: a file that cannot be read or written, a scheduler that cannot be reached.
+        ValueError: a bad study, FMU or argument; an output with the results of another sweep, or one at work in it.
+        OSError: a file that cannot be read or written, a scheduler that cannot be reached, a worker that does not see
+            the output.
     """
     chosen = study if isinstance(study, Study) else read_study(study)
-    job, about = _job(chosen, fmu, engine)
+    chunks_of = _part(part)
+    place = place_of(output or default_folder(chosen.name))
+    job = _job(chosen, fmu, engine, place)
     if workers is not None and workers < 1:
         raise ValueError(f"workers = {workers}: must be at least 1")
-    with store(Path(output) if output else default_folder(chosen.name), about, overwrite) as there:
-        return _made(chosen, there, job, partial(_chunks, workers=workers, scheduler=scheduler, tls=tls), tell)
+    with store(place, job.about, chunks_of, overwrite) as there:
+        return _made(there, job, chunks_of, partial(_chunks, workers=workers, scheduler=scheduler, tls=tls), tell)
 
 
-def _made(
-    study: Study, there: Store, job: Job, make: Callable[..., Generator[Made, None, None]], tell: Tell
-) -> Outcome:
-    size, done = job.about["chunk"], there.done
-    chunks = range(-(-study.runs // size))
-    had = sum(len(_numbers(number, size, study.runs)) for number in done)
-    left = ((number, _numbers(number, size, study.runs)) for number in chunks if number not in done)
-    todo = ((number, numbers, study.samples(numbers)) for number, numbers in left)
+def _part(part: str | None) -> Part:
+    if part is None:
+        return WHOLE
+    match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", part, re.ASCII)
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
+        raise ValueError(f"part = {part!r}: must be k/n with k from 1 to n, as 2/8")
+    return Part(int(match[1]), int(match[2]))
+
+
+def _made(there: Store, job: Job, part: Part, make: Callable[..., Generator[Made, None, None]], tell: Tell) -> Outcome:
+    def count(chunks: Iterable[int]) -> int:
+        return sum(len(job.numbers(chunk)) for chunk in chunks)
+
+    mine = range(part.k - 1, job.chunks, part.n)
+    runs, had = count(mine), count(there.done)
     new = failed = warned = 0
     first: tuple[int, str] | None = None
     tell(had)
-    if had < study.runs:
-        with closing(make(job, todo)) as chunks_made:
+    if had < runs:
+        with closing(make(job, (chunk for chunk in mine if chunk not in there.done))) as chunks_made:
             for made in chunks_made:
-                there.write(made.chunk, made.files)
                 new, failed, warned = new + made.runs, failed + made.failed, warned + made.warned
                 first = min(filter(None, (first, made.error)), default=None)
                 tell(had + new)
     error = "run {}: {}".format(*first) if first else None
-    return Outcome(there.folder, study.runs, new, failed, warned, error, tuple(there.spoiled))
+    missing = count(there.missing(chunk for chunk in range(job.chunks) if chunk not in part))
+    folder = Path(there.place.given) if there.place.folder else there.place.given
+    return Outcome(folder, runs, new, failed, warned, error, tuple(there.spoiled), missing)
 
 
 def default_folder(name: str) -> Path:
@@ -156,12 +174,8 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _numbers(chunk: int, size: int, runs: int) -> Any:
-    return np.arange(chunk * size, min((chunk + 1) * size, runs))
-
-
-def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple[Job, dict[str, Any]]:
-    """What goes to the workers, and the metadata of the results."""
+def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place: Place) -> Job:
+    """What goes to the workers."""
     if engine not in ENGINES:
         raise ValueError(must_be_one_of("engine", engine, ENGINES))
     content = None
@@ -175,7 +189,6 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
     else:
         content, own = _content(study, Path(fmu or default_fmu()))
         study = replace(study, run=study.run.on(own))
-    swept = tuple(factor.name for factor in study.factors)
     plan = Plan(study.run, study.keep, timeline(study.run, study.keep))
     about = {
         "study": study.content,
@@ -186,16 +199,16 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str) -> tuple
         "runs": study.runs,
         "chunk": _chunk(plan, study.runs, engine),
         "name": study.name,
-        "swept": list(swept),
+        "swept": [factor.name for factor in study.factors],
         "kept": list(study.keep.columns),
         "files": [RUNS, TRAJECTORIES] if study.keep.trajectory else [RUNS],
         "versions": {
-            "python": platform.python_version(), "numpy": metadata.version("numpy"), "scipy": metadata.version("scipy"),
+            "python": platform.python_version(), "numpy": metadata.version("numpy"),
             "pyarrow": metadata.version("pyarrow"), "dask": metadata.version("dask"),
         },
         "machine": f"{platform.system()} {platform.machine()}",
     }  # fmt: skip
-    return Job(uuid.uuid4().hex, __version__, plan, swept, content, about), about
+    return Job(uuid.uuid4().hex, __version__, plan, study.sampling, content, about, place)
 
 
 def _chunk(plan: Plan, runs: int, engine: str) -> int:

@@ -1,107 +1,165 @@
-"""Where a sweep's results are: a folder of Parquet files, one a chunk of runs, each written whole or not at all.
+"""A sweep's results: Parquet files in one place, one a chunk of runs, each written whole or not at all.
 
 Every file says which sweep it is of, which chunk it is, how many rows it has, and the SHA-256 of all its bytes.
 """
 
+import errno
 import hashlib
 import json
-import os
 import re
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import IO, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from ..whole import written
+from .place import Place
 
 if sys.platform == "win32":
     import msvcrt
 else:
     import fcntl
 
-RUNS, TRAJECTORIES = "runs", "trajectories"
+RUNS, TRAJECTORIES, STATEMENT = "runs", "trajectories", "sweep.json"
 KEY = b"hovercraft_fmu"
 """Of the metadata: JSON; see `packed`."""
 SAME = ("study", "engine", "fmu_sha256", "hovercraft_fmu", "runs", "chunk")
 """What must be the same where a sweep goes on; the rest of the metadata may differ."""
 OF_ONE_FILE = ("what", "number", "rows", "sha256")
 """What the metadata of one file alone has."""
-NAME = re.compile(r"\d{5,}")
+NAME = re.compile(r"\d{5,}\.parquet")
 BLANK = b"0" * 64
 SEAL = re.compile(rb'"sha256": "([0-9a-f]{64})"')
 
 
+class Part(NamedTuple):
+    """An n-th of a sweep's chunks: every n-th one, from the k-th on."""
+
+    k: int
+    """From 1"""
+    n: int
+
+    def __contains__(self, chunk: object) -> bool:
+        return isinstance(chunk, int) and chunk % self.n == self.k - 1
+
+
+WHOLE = Part(1, 1)
+
+
 class Store:
-    """The folder of one sweep: runs/00000.parquet, ..., and trajectories/ where they are kept.
+    """The place of one sweep: runs/00000.parquet, ..., and trajectories/ where they are kept.
+
+    Its sweep.json says which sweep it is of, before there is a chunk: to who starts another one, and to every worker,
+    which so knows that it sees the same place.
+
+    Args:
+        place: see `Place`.
+        about: the metadata of the sweep.
+        part: see `Part`; what others make is not looked at.
+        alone: nobody else is at work there.
 
     Raises:
-        ValueError: the folder holds another sweep's results, or other files.
+        ValueError: it holds another sweep's results, or other files.
         OSError: it cannot be read or written.
     """
 
-    def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
-        self.folder = folder
+    def __init__(self, place: Place, about: Mapping[str, Any], part: Part = WHOLE, alone: bool = False) -> None:
+        self.place = place
         self.done: set[int] = set()
-        """The numbers of the chunks that are there."""
+        """The numbers of the chunks that are there, of this part."""
         self.spoiled: list[str] = []
         """What was set aside, and why: it must be made anew."""
-        wrong: dict[Path, str] = {}
-        for path in chunk_files(folder, RUNS):
-            whole = [folder / what / path.name for what in about["files"]]
-            found = {each: why for each in whole if (why := _wrong(each, about))}
+        numbers = chunk_numbers(place, RUNS)
+        stated = statement(place)
+        if stated and (numbers or not alone):
+            self._check_same(different(stated, about))
+        wrong: dict[str, str] = {}
+        for number in numbers:
+            if number not in part:
+                continue
+            files = (chunk_file(what, number) for what in about["files"])
+            found = {file: why for file in files if (why := _wrong(place, file, about))}
             wrong |= found
             if not found:
-                self.done.add(int(path.stem))
-        another = [why for why in wrong.values() if why.startswith(ANOTHER)]
-        if another and not self.done:
-            raise ValueError(
-                f"{folder}: holds the results of {another[0]}: name another folder as output, or overwrite it"
-            )
-        for path, why in wrong.items():
-            if path.exists():
-                path.replace(path.with_name(f".{path.name}.spoiled"))
-            self.spoiled.append(f"{path}: {why}")
+                self.done.add(number)
+        if not self.done:
+            self._check_same(next((why for why in wrong.values() if why.startswith(ANOTHER)), ""))
+        for name, why in wrong.items():
+            what, _, file = name.partition("/")
+            place.rename(name, f"{what}/.{file}.spoiled")
+            self.spoiled.append(f"{place}/{name}: {why}")
+        if not stated or different(stated, about):
+            self._state(about, anew=stated is None)
 
-    def write(self, chunk: int, files: Mapping[str, bytes]) -> None:
-        """Write the files of a chunk; see `packed`. Its runs come last: where they are, all of it is."""
-        for what in sorted(files, key=lambda what: what == RUNS):
-            with written(self.folder / what / f"{chunk:05}.parquet") as path, path.open("wb") as file:
-                file.write(files[what])
-                file.flush()
-                os.fsync(file.fileno())
+    def missing(self, chunks: Iterable[int]) -> list[int]:
+        """Those of them that are not there, now."""
+        there = set(chunk_numbers(self.place, RUNS))
+        return [chunk for chunk in chunks if chunk not in there]
+
+    def _check_same(self, why: str) -> None:
+        if why:
+            raise ValueError(f"{self.place}: holds the results of {why}: name another output, or overwrite it")
+
+    def _state(self, about: Mapping[str, Any], anew: bool) -> None:
+        content = json.dumps({name: about[name] for name in SAME}).encode()
+        try:
+            if anew:
+                self.place.create(STATEMENT, content)
+                return
+        except FileExistsError:  # in this moment; or it is damaged
+            self._check_same(different(statement(self.place) or about, about))
+        self.place.write(STATEMENT, content)
+
+
+def statement(place: Place) -> dict[str, Any] | None:
+    """What sweep.json says; None: it is not there, or damaged."""
+    try:
+        return dict(json.loads(place.read(STATEMENT)))
+    except (FileNotFoundError, TypeError, ValueError):
+        return None
 
 
 @contextmanager
-def store(folder: Path, about: Mapping[str, Any], overwrite: bool = False) -> Iterator[Store]:
-    """The store, for this process alone; with `overwrite` without the results that are there.
+def store(place: Place, about: Mapping[str, Any], part: Part = WHOLE, overwrite: bool = False) -> Iterator[Store]:
+    """The store; a folder for this process alone, or for those that make parts of that sweep.
 
-    Raises as `Store` does; ValueError: another process has it.
+    Raises as `Store` does; ValueError: another process has it; `overwrite`, which deletes what is there, of a part.
     """
+    if overwrite and part != WHOLE:
+        raise ValueError("overwrite: must not be given with part: it would delete what other parts have made")
+    with _locked(place.folder, shared=part != WHOLE) if place.folder else nullcontext(False) as alone:
+        if alone and place.folder:
+            for left in place.folder.glob("*/.*.parquet.*[0-9]"):  # of one that was killed
+                left.unlink(missing_ok=True)
+        if overwrite:
+            files = (chunk_file(what, n) for what in (RUNS, TRAJECTORIES) for n in chunk_numbers(place, what))
+            place.remove([*files, STATEMENT])
+        yield Store(place, about, part, alone)
+
+
+@contextmanager
+def _locked(folder: Path, shared: bool) -> Iterator[bool]:
+    """Whether nobody else is at work there, as far as the file system tells."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".lock").open("a+b") as lock:  # the system lets go of it when the process ends, however it does
-        _take(lock, folder)
-        for left in folder.glob("*/.*.parquet.*[0-9]"):  # of one that was killed
-            left.unlink()
-        for path in (*chunk_files(folder, RUNS), *chunk_files(folder, TRAJECTORIES)) if overwrite else ():
-            path.unlink()
-        yield Store(folder, about)
-
-
-def _take(lock: IO[bytes], folder: Path) -> None:
-    try:
-        if sys.platform == "win32":
-            lock.seek(0)
-            msvcrt.locking(lock.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError) as error:
-        raise ValueError(f"{folder}: another sweep is at work here: wait for it, or name another folder") from error
+        try:
+            if sys.platform != "win32":
+                fcntl.flock(lock, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+            elif not shared:  # there are none on Windows
+                lock.seek(0)
+                msvcrt.locking(lock.fileno(), msvcrt.LK_NBLCK, 1)
+        except (BlockingIOError, PermissionError) as error:
+            raise ValueError(f"{folder}: another sweep is at work here: wait for it, or name another folder") from error
+        except OSError as error:
+            if error.errno not in (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP):
+                raise
+            shared = True  # no locks there, as in some file systems of clusters
+        yield not shared
 
 
 # ---- what is there
@@ -110,24 +168,29 @@ def _take(lock: IO[bytes], folder: Path) -> None:
 ANOTHER = "another sweep ("
 
 
-def chunk_files(folder: Path, what: str) -> list[Path]:
-    """The files of the chunks that are there, in their order. Raises ValueError where there are others."""
-    found = sorted(path for path in (folder / what).glob("*.parquet") if not path.name.startswith("."))
-    for path in found:
-        if not NAME.fullmatch(path.stem):
-            raise ValueError(f"{path}: is none of a sweep's files: move it elsewhere")
-    return found
+def chunk_numbers(place: Place, what: str) -> list[int]:
+    """The numbers of the chunks that are there, in their order. Raises ValueError where there are other files."""
+    found = [name for name in place.names(what) if name.endswith(".parquet") and not name.startswith(".")]
+    for name in found:
+        if not NAME.fullmatch(name):
+            raise ValueError(f"{place}/{what}/{name}: is none of a sweep's files: move it elsewhere")
+    return sorted(int(name.partition(".")[0]) for name in found)
 
 
-def _wrong(path: Path, about: Mapping[str, Any]) -> str:
+def chunk_file(what: str, number: int) -> str:
+    """The name of a chunk's file."""
+    return f"{what}/{number:05}.parquet"
+
+
+def _wrong(place: Place, name: str, about: Mapping[str, Any]) -> str:
     """Why a file is none of that sweep; '' where it is right."""
     try:
-        there, _ = opened(path)
+        there, _ = opened(place, name)
     except FileNotFoundError:
         return "is missing"
     except ValueError as error:
         return str(error)
-    return different(there, about) or misplaced(path, there)
+    return different(there, about) or misplaced(name, there)
 
 
 def different(there: Mapping[str, Any], about: Mapping[str, Any]) -> str:
@@ -136,16 +199,16 @@ def different(there: Mapping[str, Any], about: Mapping[str, Any]) -> str:
     return f"{ANOTHER}{', '.join(names)} differ)" if names else ""
 
 
-def misplaced(path: Path, there: Mapping[str, Any]) -> str:
+def misplaced(name: str, there: Mapping[str, Any]) -> str:
     """Why a file is not where it belongs; '' where it is."""
-    if (there["what"], f"{there['number']:05}") != (path.parent.name, path.stem):
+    if chunk_file(there["what"], there["number"]) != name:
         return f"is chunk {there['number']} of the {there['what']}, under another name"
     return ""
 
 
-def opened(path: Path) -> tuple[dict[str, Any], bytes]:
+def opened(place: Place, name: str) -> tuple[dict[str, Any], bytes]:
     """The metadata and the content of a file that is as it was written. Raises ValueError: it is not."""
-    content = path.read_bytes()
+    content = place.read(name)
     seals = set(SEAL.findall(content))
     if len(seals) != 1:
         raise ValueError("is no file of a sweep, or cut: it has no checksum")

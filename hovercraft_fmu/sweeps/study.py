@@ -7,13 +7,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
-from scipy.stats import qmc
 
 from ..fmu.interface import BY_NAME, EXTERNAL, INPUTS, WIND
 from ..fmu.near_names import beside, did_you_mean, must_be_one_of
@@ -25,6 +22,7 @@ from ..scenes import Signals
 from ..simulation import Run, check_effect, plan, read_inputs
 from ..simulation.planning import MAX_STEPS, MistakesError
 from .quantities import FORMULAS, OBSERVED, Event, Keep
+from .sampling import DISTRIBUTIONS, Factor, Sampling, distributed, log_uniform, uniform
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -37,8 +35,8 @@ STUDIES = tuple(sorted(path.stem for path in SHIPPED.glob("*.toml")))
 TOP = ("scene", "inputs", "preset", "start_time", "stop_time", "communication_step", "set", "sweep", "sampling", "keep")
 GRID, LATIN_HYPERCUBE = "grid", "latin_hypercube"
 SAMPLING = (GRID, LATIN_HYPERCUBE)
-MAX_RUNS = 10**8
-"""Or a slip of the decimal point: the samples of a Latin hypercube are all in memory."""
+MAX_RUNS = 10**10
+"""Or a slip of the decimal point."""
 
 
 Given = ParamSpec("Given")
@@ -62,52 +60,6 @@ class Mistakes(list[str]):
             raise MistakesError(self)
 
 
-class Distribution(NamedTuple):
-    """How a parameter is distributed: scipy's distribution, frozen, and its numbers as the study has them."""
-
-    numbers: tuple[str, ...]
-    frozen: Any
-    """(numbers) -> the frozen distribution"""
-
-
-DISTRIBUTIONS: Mapping[str, Distribution] = MappingProxyType(
-    {
-        "normal": Distribution(("mean", "standard deviation"), stats.norm),
-        "lognormal": Distribution(
-            ("median", "standard deviation of the logarithm"), lambda median, sd: stats.lognorm(sd, scale=median)
-        ),
-        "triangular": Distribution(
-            ("lowest", "most likely", "highest"),
-            lambda low, mode, high: stats.triang((mode - low) / (high - low), loc=low, scale=high - low),
-        ),
-    }
-)
-
-
-@dataclass(frozen=True)
-class Factor:
-    """A swept parameter: values to choose from, or a distribution."""
-
-    name: str
-    values: tuple[float | int, ...] = ()
-    distribution: Any = None
-    """scipy's, frozen; instead of values"""
-
-    @property
-    def kind(self) -> type[np.float64] | type[np.int32]:
-        """Of the values, as the FMU has them."""
-        return np.float64 if BY_NAME[self.name].kind == "Real" else np.int32
-
-    def at(self, part: NDArray[np.float64]) -> NDArray[Any]:
-        """The values at these parts (0 to 1) of the probability; of a list, every item has the same share."""
-        if self.distribution is not None:
-            found: NDArray[Any] = self.distribution.ppf(part)
-            return found
-        chosen = np.minimum((part * len(self.values)).astype(np.int64), len(self.values) - 1)
-        items: NDArray[Any] = np.array(self.values, self.kind)
-        return np.take(items, chosen)
-
-
 @dataclass(frozen=True)
 class Study:
     """A study, checked. Every run has a number; its parameters follow from that and the study alone."""
@@ -115,24 +67,24 @@ class Study:
     name: str
     run: Run
     """All that the runs share: the scene or the inputs, the fixed settings, the times."""
-    factors: tuple[Factor, ...]
+    sampling: Sampling
     keep: Keep
-    runs: int
-    latin: NDArray[np.float64] | None
-    """The points of the Latin hypercube, shape (runs, factors); None for the full grid."""
     content: str
     """The study as JSON, inputs and all: two studies are the same where this is."""
 
+    @property
+    def factors(self) -> tuple[Factor, ...]:
+        """What is swept."""
+        return self.sampling.factors
+
+    @property
+    def runs(self) -> int:
+        """How many there are."""
+        return self.sampling.runs
+
     def samples(self, numbers: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
-        """The swept parameters of these runs; on the grid the last factor changes first."""
-        if self.latin is not None:
-            return {factor.name: factor.at(self.latin[numbers, i]) for i, factor in enumerate(self.factors)}
-        shape = [len(factor.values) for factor in self.factors]
-        places = np.unravel_index(numbers, shape)
-        return {
-            factor.name: np.array(factor.values, factor.kind)[place]
-            for factor, place in zip(self.factors, places, strict=True)
-        }
+        """See `Sampling.samples`."""
+        return self.sampling.samples(numbers)
 
 
 def read_study(source: str | Path | Mapping[str, Any]) -> Study:
@@ -176,7 +128,7 @@ def _study(table: Mapping[str, Any], name: str, folder: Path) -> Study:
         mistakes += _same_columns((factor.name for factor in right), keep)
     if mistakes or not (source and run and sampled and keep):
         raise MistakesError(mistakes)
-    return Study(name, run, right, keep, *sampled, _content(table, source.log))
+    return Study(name, run, sampled, keep, _content(table, source.log))
 
 
 def _same_columns(swept: Iterable[str], keep: Keep) -> list[str]:
@@ -365,9 +317,7 @@ def _spread(name: str, low: Any, high: Any, scale: str, count: int | None) -> Fa
     if count is not None:
         spaced = np.linspace(low, high, count) if scale == "linear" else np.geomspace(low, high, count)
         return Factor(name, tuple(spaced.tolist()))
-    return Factor(
-        name, distribution=stats.uniform(low, high - low) if scale == "linear" else stats.loguniform(low, high)
-    )
+    return distributed(name, uniform if scale == "linear" else log_uniform, low, high)
 
 
 def _distributed(name: str, spec: Mapping[str, Any]) -> Factor:
@@ -385,11 +335,10 @@ def _distributed(name: str, spec: Mapping[str, Any]) -> Factor:
         raise ValueError(f"{where} = {given!r}: the standard deviation must be greater than 0")
     if kind == "lognormal" and not numbers[0] > 0.0:
         raise ValueError(f"{where} = {given!r}: the median must be greater than 0")
-    return Factor(name, distribution=distribution.frozen(*numbers))
+    return distributed(name, distribution.quantile, *numbers)
 
 
-def _sampled(table: Mapping[str, Any], factors: tuple[Factor, ...]) -> tuple[int, NDArray[np.float64] | None]:
-    """Number of runs, and the points of a Latin hypercube."""
+def _sampled(table: Mapping[str, Any], factors: tuple[Factor, ...]) -> Sampling:
     method = table.get("method", GRID)
     if method not in SAMPLING:
         raise ValueError(f"sampling.method = {method!r}: must be one of {', '.join(SAMPLING)}")
@@ -399,16 +348,15 @@ def _sampled(table: Mapping[str, Any], factors: tuple[Factor, ...]) -> tuple[int
         mistakes += [
             f"sweep.{factor.name}: must be a list, or a range with a count, where sampling.method is {GRID}"
             for factor in factors
-            if factor.distribution is not None
+            if factor.quantile
         ]
         mistakes.tell()
-        return _few_enough(prod(len(factor.values) for factor in factors)), None
+        return Sampling(factors, _few_enough(prod(len(factor.values) for factor in factors)), None)
     mistakes.tried(_known, table, ("method", "runs", "seed"), "sampling.")
     runs = mistakes.tried(_whole, table.get("runs"), "sampling.runs", 1)
     seed = mistakes.tried(_whole, table.get("seed"), "sampling.seed", 0)
     mistakes.tell()
-    number = _few_enough(runs or 0)
-    return number, qmc.LatinHypercube(d=len(factors), seed=np.random.default_rng(seed)).random(number)
+    return Sampling(factors, _few_enough(runs or 0), seed)
 
 
 def _few_enough(runs: int) -> int:

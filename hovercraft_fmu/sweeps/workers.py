@@ -7,52 +7,51 @@ from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from ..host import SimulationError
 from ..stopping import held
 from ..whole import temporary_folder
-from .quantities import Samples
+from .place import Place
 from .work import Job, Made, make_chunk, release
 
-Part: TypeAlias = tuple[int, Any, Samples]
-"""Number of a chunk, numbers of its runs, what is swept."""
-Todo: TypeAlias = Iterable[Part]
+Todo: TypeAlias = Iterable[int]
+"""Numbers of chunks."""
 
 
 def made_here(job: Job, todo: Todo) -> Generator[Made, None, None]:
     """In this process."""
     try:
-        for part in todo:
-            yield make_chunk(job, *part)
+        for chunk in todo:
+            yield make_chunk(job, chunk)
     finally:
         release(job.sweep)
 
 
 def made_beside(job: Job, todo: Todo, workers: int) -> Generator[Made, None, None]:
-    """In processes of their own, as they are made; each has one chunk, so that memory here and there stays bounded.
+    """In processes of their own, as they are made; each has one chunk.
 
     Raises SimulationError where a process ended.
     """
-    parts = iter(todo)
-    first = list(islice(parts, workers))
-    with _processes(len(first)) as ends:
+    chunks = iter(todo)
+    first = list(islice(chunks, workers))
+    with _processes(len(first), job.place) as ends:
         try:
-            for end, part in zip(ends, first, strict=True):
+            for end, chunk in zip(ends, first, strict=True):
                 end.send(job)
-                end.send(part)
-            yield from _received(list(ends), parts)
+                end.send(chunk)
+            yield from _received(list(ends), chunks)
         except (EOFError, ConnectionError) as error:
             raise SimulationError("a worker is gone: its process ended") from error
 
 
-def _received(busy: list[Connection], parts: Iterator[Part]) -> Iterator[Made]:
-    """What the workers send, who have a part each, and then the next one."""
+def _received(busy: list[Connection], chunks: Iterator[int]) -> Iterator[Made]:
+    """What the workers send, who have a chunk each, and then the next one."""
     while busy:
         ready = wait(busy)
         for end in [each for each in busy if each in ready]:
             made = end.recv()
-            following = next(parts, None)
+            following = next(chunks, None)
             if following is None:
                 busy.remove(end)
             else:
@@ -63,7 +62,7 @@ def _received(busy: list[Connection], parts: Iterator[Part]) -> Iterator[Made]:
 
 
 @contextmanager
-def _processes(count: int) -> Iterator[list[Connection]]:
+def _processes(count: int, place: Place) -> Iterator[list[Connection]]:
     """Workers, each at the other end of one of these; they end with the context, or with this process."""
     context = get_context("spawn")
     # a worker that is ended in the middle of a chunk leaves the FMU's files: they go with this folder
@@ -82,6 +81,8 @@ def _processes(count: int) -> Iterator[list[Connection]]:
             for process in processes:
                 if process.pid:
                     process.kill()
+                    process.join()
+                    place.clear_up(process.pid)
             raise
         finally:
             for end in ends:
@@ -106,7 +107,7 @@ def _deaf() -> Iterator[None]:
 
 
 def _work(end: Connection, folder: str) -> None:
-    """A worker: it is sent a job and then part after part, until the other end is closed."""
+    """A worker: it is sent a job and then chunk after chunk, until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tempfile.tempdir = folder
     try:
@@ -120,8 +121,8 @@ def _work(end: Connection, folder: str) -> None:
         pass
 
 
-def _made(job: Job, part: Part) -> Made | Exception:
+def _made(job: Job, chunk: int) -> Made | Exception:
     try:
-        return make_chunk(job, *part)
+        return make_chunk(job, chunk)
     except Exception as error:
         return error
