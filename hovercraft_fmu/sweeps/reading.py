@@ -36,7 +36,7 @@ def load(folder: str | os.PathLike[str], what: str = RUNS, check: bool = True) -
     or what is there of a sweep that was ended, is plain Parquet: pandas.read_parquet(folder / "runs").
 
     Args:
-        folder: of the sweep.
+        folder: of the sweep, or its address.
         what: runs or trajectories.
         check: wherever rows of a file are asked for read all of it, and compare its checksum, its study and its
             number: ValueError where they are others. Without, only the parts that are asked for are read.
