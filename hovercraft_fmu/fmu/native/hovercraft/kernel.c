@@ -362,12 +362,12 @@ static ALWAYS_INLINE struct loads loads_as(struct load_function *f, enum drag_ki
     }
     if (!beside)
         return loads;
-    if (beside & OUTSIDE) {
+    if (beside != FRICTION) { /* OUTSIDE is in it; asked so, a sub-step has fewer instructions */
         loads.x = loads.x + f->external_x;
         loads.y = loads.y + f->external_y;
         loads.moment = loads.moment + f->external_moment;
     }
-    if (beside & FRICTION) {
+    if (beside != OUTSIDE) { /* FRICTION is in it */
         const double turning = f->radius * yaw_rate;
         const double slowness = 1.0 / larger(slip_speed(vx, vy, turning), LEAST_SLIP);
         loads.x = loads.x - f->grip * slowness * vx;
@@ -513,10 +513,10 @@ static bool is_finite(const struct state *s)
            isfinite(s->yaw_rate);
 }
 
-/* Of a motion that has left the range of numbers nothing more is worked out. */
-static ALWAYS_INLINE bool is_over(const struct state *s, int64_t done)
+/* Sub-steps are made in pieces: of a motion that has left the range of numbers nothing more is worked out. */
+static ALWAYS_INLINE int64_t end_of_piece(int64_t begun, int64_t n)
 {
-    return (done & (PIECE - 1)) == 0 && !is_finite(s);
+    return n - begun > PIECE ? begun + PIECE : n;
 }
 
 static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, unsigned beside, const struct state *state,
@@ -525,22 +525,23 @@ static ALWAYS_INLINE struct stretch euler_as(enum drag_kind kind, unsigned besid
     const struct friction friction = friction_function(f->craft, h);
     struct state s = *state;
     struct watch watch = {0.0, s.yaw_rate, s.yaw_rate};
-    for (int64_t i = 0; i < n; i++) {
-        steer_at(f, (double)i * h);
-        const struct loads push = loads_as(f, kind, beside, s.heading, s.vx, s.vy, s.yaw_rate);
-        watch_loads(&watch, f, kind, push.kq, s.yaw_rate);
-        s.vx = s.vx + push.x;
-        s.vy = s.vy + push.y;
-        s.yaw_rate = s.yaw_rate + push.moment;
-        if (friction.rubs)
-            rub(&friction, &s.vx, &s.vy, &s.yaw_rate);
-        s.x = s.x + h * s.vx;
-        s.y = s.y + h * s.vy;
-        s.heading = s.heading + h * s.yaw_rate;
-        watch_yaw_rate(&watch, s.yaw_rate);
-        if (is_over(&s, i + 1))
-            break;
-    }
+    int64_t i = 0;
+    do
+        for (const int64_t end = end_of_piece(i, n); i < end; i++) {
+            steer_at(f, (double)i * h);
+            const struct loads push = loads_as(f, kind, beside, s.heading, s.vx, s.vy, s.yaw_rate);
+            watch_loads(&watch, f, kind, push.kq, s.yaw_rate);
+            s.vx = s.vx + push.x;
+            s.vy = s.vy + push.y;
+            s.yaw_rate = s.yaw_rate + push.moment;
+            if (friction.rubs)
+                rub(&friction, &s.vx, &s.vy, &s.yaw_rate);
+            s.x = s.x + h * s.vx;
+            s.y = s.y + h * s.vy;
+            s.heading = s.heading + h * s.yaw_rate;
+            watch_yaw_rate(&watch, s.yaw_rate);
+        }
+    while (i < n && is_finite(&s));
     return stretch_of(f, &s, n, h, &watch);
 }
 
@@ -550,7 +551,7 @@ static struct stretch semi_implicit_euler(const struct state *state, struct load
 {
     if (f->kind == PLAIN_DRAG)
         return euler_as(PLAIN_DRAG, 0, state, f, h, n);
-    return euler_as(f->kind == WITHOUT_DRAG ? WITHOUT_DRAG : ANY_DRAG, f->beside, state, f, h, n);
+    return euler_as(f->kind == WITHOUT_DRAG ? WITHOUT_DRAG : ANY_DRAG, f->beside & OUTSIDE, state, f, h, n);
 }
 
 /* Ahead, abeam and turning, at a heading: the craft's own push, and what comes from outside. */
@@ -579,47 +580,48 @@ static struct stretch drag_implicit(const struct state *state, struct load_funct
     double damped = inertia;
     struct state z = *state;
     struct watch watch = {0.0, z.yaw_rate, z.yaw_rate};
-    for (int64_t i = 0; i < n; i++) {
-        steer_at(f, (double)i * h);
-        const struct trig_pair turned = sine_cosine(z.heading, &f->last);
-        const double c = turned.cosine, s = turned.sine;
-        const double kq = f->k * air_at(f, f->kind, c, s, z.vx, z.vy, z.yaw_rate).q;
-        const double g = h * kq;
-        watch_loads(&watch, f, f->kind, kq, z.yaw_rate);
-        struct push push = push_at(f, 0, c, s);
-        if (scene) {
-            if (in_wind) {
-                z.vx = z.vx - f->wind_x;
-                z.vy = z.vy - f->wind_y;
+    int64_t i = 0;
+    do
+        for (const int64_t end = end_of_piece(i, n); i < end; i++) {
+            steer_at(f, (double)i * h);
+            const struct trig_pair turned = sine_cosine(z.heading, &f->last);
+            const double c = turned.cosine, s = turned.sine;
+            const double kq = f->k * air_at(f, f->kind, c, s, z.vx, z.vy, z.yaw_rate).q;
+            const double g = h * kq;
+            watch_loads(&watch, f, f->kind, kq, z.yaw_rate);
+            struct push push = push_at(f, 0, c, s);
+            if (scene) {
+                if (in_wind) {
+                    z.vx = z.vx - f->wind_x;
+                    z.vy = z.vy - f->wind_y;
+                }
+                if (spins)
+                    damped = inertia + h * spin * fabs(z.yaw_rate);
+                push = push_at(f, f->beside, c, s);
             }
-            if (spins)
-                damped = inertia + h * spin * fabs(z.yaw_rate);
-            push = push_at(f, f->beside, c, s);
+            const double v = c * z.vy - s * z.vx;
+            const double b = inertia * z.yaw_rate + h * push.turn;
+            const double e = x_d * (mass * v + h * push.abeam) - b;
+            const double determinant = mass * damped + g * (damped + arm);
+            const double kept = mass / (mass + g);
+            const double surge = h * push.ahead / (mass + g);
+            const double sway =
+                ((damped + g * square) * (h * push.abeam) + g * x_d * (x_d * (g * kept) * v - b)) / determinant;
+            z.yaw_rate = (mass * b - g * e) / determinant;
+            z.vx = kept * z.vx + (c * surge - s * sway);
+            z.vy = kept * z.vy + (s * surge + c * sway);
+            if (in_wind) {
+                z.vx = z.vx + f->wind_x;
+                z.vy = z.vy + f->wind_y;
+            }
+            if (friction.rubs)
+                rub(&friction, &z.vx, &z.vy, &z.yaw_rate);
+            z.x = z.x + h * z.vx;
+            z.y = z.y + h * z.vy;
+            z.heading = z.heading + h * z.yaw_rate;
+            watch_yaw_rate(&watch, z.yaw_rate);
         }
-        const double v = c * z.vy - s * z.vx;
-        const double b = inertia * z.yaw_rate + h * push.turn;
-        const double e = x_d * (mass * v + h * push.abeam) - b;
-        const double determinant = mass * damped + g * (damped + arm);
-        const double kept = mass / (mass + g);
-        const double surge = h * push.ahead / (mass + g);
-        const double sway =
-            ((damped + g * square) * (h * push.abeam) + g * x_d * (x_d * (g * kept) * v - b)) / determinant;
-        z.yaw_rate = (mass * b - g * e) / determinant;
-        z.vx = kept * z.vx + (c * surge - s * sway);
-        z.vy = kept * z.vy + (s * surge + c * sway);
-        if (in_wind) {
-            z.vx = z.vx + f->wind_x;
-            z.vy = z.vy + f->wind_y;
-        }
-        if (friction.rubs)
-            rub(&friction, &z.vx, &z.vy, &z.yaw_rate);
-        z.x = z.x + h * z.vx;
-        z.y = z.y + h * z.vy;
-        z.heading = z.heading + h * z.yaw_rate;
-        watch_yaw_rate(&watch, z.yaw_rate);
-        if (is_over(&z, i + 1))
-            break;
-    }
+    while (i < n && is_finite(&z));
     return stretch_of(f, &z, n, h, &watch);
 }
 
@@ -630,38 +632,39 @@ static ALWAYS_INLINE struct stretch rk4_as(enum drag_kind kind, unsigned beside,
     const double half = 0.5 * h, sixth = h / 6.0, square = h * h / 6.0;
     struct state s = *state;
     struct watch watch = {0.0, s.yaw_rate, s.yaw_rate};
-    for (int64_t i = 0; i < n; i++) {
-        const double t = (double)i * h;
-        steer_at(f, t);
-        const struct loads a1 = loads_as(f, kind, beside, s.heading, s.vx, s.vy, s.yaw_rate);
-        const double r2 = s.yaw_rate + half * a1.moment;
-        steer_at(f, t + half);
-        const struct loads a2 = loads_as(f, kind, beside, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
-                                                 s.vy + half * a1.y, r2);
-        const double r3 = s.yaw_rate + half * a2.moment;
-        const struct loads a3 =
-            loads_as(f, kind, beside, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
-        const double r4 = s.yaw_rate + h * a3.moment;
-        steer_at(f, t + h);
-        const struct loads a4 = loads_as(f, kind, beside, s.heading + h * r3, s.vx + h * a3.x,
-                                                 s.vy + h * a3.y, r4);
-        watch_loads(&watch, f, kind, a1.kq, s.yaw_rate);
-        watch_loads(&watch, f, kind, a2.kq, r2);
-        watch_loads(&watch, f, kind, a3.kq, r3);
-        watch_loads(&watch, f, kind, a4.kq, r4);
-        s.x = s.x + h * s.vx + square * (a1.x + a2.x + a3.x);
-        s.y = s.y + h * s.vy + square * (a1.y + a2.y + a3.y);
-        s.heading = s.heading + h * s.yaw_rate + square * (a1.moment + a2.moment + a3.moment);
-        s.vx = s.vx + sixth * (a1.x + 2.0 * a2.x + 2.0 * a3.x + a4.x);
-        s.vy = s.vy + sixth * (a1.y + 2.0 * a2.y + 2.0 * a3.y + a4.y);
-        s.yaw_rate = s.yaw_rate + sixth * (a1.moment + 2.0 * a2.moment + 2.0 * a3.moment + a4.moment);
-        watch_yaw_rate(&watch, r2);
-        watch_yaw_rate(&watch, r3);
-        watch_yaw_rate(&watch, r4);
-        watch_yaw_rate(&watch, s.yaw_rate);
-        if (is_over(&s, i + 1))
-            break;
-    }
+    int64_t i = 0;
+    do
+        for (const int64_t end = end_of_piece(i, n); i < end; i++) {
+            const double t = (double)i * h;
+            steer_at(f, t);
+            const struct loads a1 = loads_as(f, kind, beside, s.heading, s.vx, s.vy, s.yaw_rate);
+            const double r2 = s.yaw_rate + half * a1.moment;
+            steer_at(f, t + half);
+            const struct loads a2 = loads_as(f, kind, beside, s.heading + half * s.yaw_rate, s.vx + half * a1.x,
+                                                     s.vy + half * a1.y, r2);
+            const double r3 = s.yaw_rate + half * a2.moment;
+            const struct loads a3 =
+                loads_as(f, kind, beside, s.heading + half * r2, s.vx + half * a2.x, s.vy + half * a2.y, r3);
+            const double r4 = s.yaw_rate + h * a3.moment;
+            steer_at(f, t + h);
+            const struct loads a4 = loads_as(f, kind, beside, s.heading + h * r3, s.vx + h * a3.x,
+                                                     s.vy + h * a3.y, r4);
+            watch_loads(&watch, f, kind, a1.kq, s.yaw_rate);
+            watch_loads(&watch, f, kind, a2.kq, r2);
+            watch_loads(&watch, f, kind, a3.kq, r3);
+            watch_loads(&watch, f, kind, a4.kq, r4);
+            s.x = s.x + h * s.vx + square * (a1.x + a2.x + a3.x);
+            s.y = s.y + h * s.vy + square * (a1.y + a2.y + a3.y);
+            s.heading = s.heading + h * s.yaw_rate + square * (a1.moment + a2.moment + a3.moment);
+            s.vx = s.vx + sixth * (a1.x + 2.0 * a2.x + 2.0 * a3.x + a4.x);
+            s.vy = s.vy + sixth * (a1.y + 2.0 * a2.y + 2.0 * a3.y + a4.y);
+            s.yaw_rate = s.yaw_rate + sixth * (a1.moment + 2.0 * a2.moment + 2.0 * a3.moment + a4.moment);
+            watch_yaw_rate(&watch, r2);
+            watch_yaw_rate(&watch, r3);
+            watch_yaw_rate(&watch, r4);
+            watch_yaw_rate(&watch, s.yaw_rate);
+        }
+    while (i < n && is_finite(&s));
     return stretch_of(f, &s, n, h, &watch);
 }
 
@@ -680,17 +683,18 @@ static struct stretch rk4_with_friction(const struct state *state, const struct 
     const struct friction friction = friction_function(craft, h);
     const double near = NEAR_REST * larger(friction.a, friction.b);
     struct stretch whole = {.state = *state, .substeps = n, .substep = h};
-    for (int64_t i = 0; i < n; i++) {
-        const struct state *s = &whole.state;
-        const bool at_rest = slip_speed(s->vx, s->vy, friction.radius * s->yaw_rate) < near;
-        free.begun = sliding.begun = (double)i * h;
-        const struct stretch one = at_rest ? semi_implicit_euler(s, &free, h, 1) : smooth_rk4(s, &sliding, h, 1);
-        whole.state = one.state;
-        whole.stability = larger(whole.stability, one.stability);
-        whole.rotation = larger(whole.rotation, one.rotation);
-        if (is_over(&whole.state, i + 1))
-            break;
-    }
+    int64_t i = 0;
+    do
+        for (const int64_t end = end_of_piece(i, n); i < end; i++) {
+            const struct state *s = &whole.state;
+            const bool at_rest = slip_speed(s->vx, s->vy, friction.radius * s->yaw_rate) < near;
+            free.begun = sliding.begun = (double)i * h;
+            const struct stretch one = at_rest ? semi_implicit_euler(s, &free, h, 1) : smooth_rk4(s, &sliding, h, 1);
+            whole.state = one.state;
+            whole.stability = larger(whole.stability, one.stability);
+            whole.rotation = larger(whole.rotation, one.rotation);
+        }
+    while (i < n && is_finite(&whole.state));
     return whole;
 }
 
@@ -754,49 +758,50 @@ static ALWAYS_INLINE struct stretch splitting_as(enum drag_kind kind, unsigned b
     };
     struct state z = *state;
     struct watch watch = {0.0, z.yaw_rate, z.yaw_rate};
-    for (int64_t i = 0; i < n; i++) {
-        steer_at(f, (double)i * h + half);
-        z.x = z.x + half * z.vx;
-        z.y = z.y + half * z.vy;
-        z.heading = z.heading + half * z.yaw_rate;
-        const struct trig_pair turned = sine_cosine(z.heading, &f->last);
-        const double c = turned.cosine, s = turned.sine, begun = fabs(z.yaw_rate);
-        const struct push push = push_at(f, beside, c, s);
-        r.push = push.abeam + f->x_d * push.turn;
-        if (spins)
-            z.yaw_rate = z.yaw_rate / (1.0 + slowing * fabs(z.yaw_rate));
-        const struct air air = air_at(f, kind, c, s, z.vx, z.vy, z.yaw_rate);
-        const double kq = kind == WITHOUT_DRAG ? 0.0 : f->k * air.q;
-        struct air middle = {
-            .u = (air.u + 0.5 * push.ahead) / (1.0 + at_most(0.5 * (kq * r.ahead))),
-            .w = (air.w + 0.5 * r.push) / (1.0 + at_most(0.5 * (kq * r.abeam))),
-        };
-        if (friction.rubs)
-            middle = rubbed_half(f, &r, &push, &of_half, c, s, &z, &air, &middle);
-        const double then = kind == WITHOUT_DRAG ? 0.0 : f->k * air_speed(f, kind, middle.u, middle.w);
-        double surge = push.ahead, sway = push.abeam, yaw = push.turn;
-        if (then != 0.0) {
-            const double lost = r.push - gained(air.w, r.push, then * r.abeam);
-            surge = gained(air.u, push.ahead, then * r.ahead);
-            sway = push.abeam - lost * r.of_sway;
-            yaw = push.turn - lost * r.of_yaw;
+    int64_t i = 0;
+    do
+        for (const int64_t end = end_of_piece(i, n); i < end; i++) {
+            steer_at(f, (double)i * h + half);
+            z.x = z.x + half * z.vx;
+            z.y = z.y + half * z.vy;
+            z.heading = z.heading + half * z.yaw_rate;
+            const struct trig_pair turned = sine_cosine(z.heading, &f->last);
+            const double c = turned.cosine, s = turned.sine, begun = fabs(z.yaw_rate);
+            const struct push push = push_at(f, beside, c, s);
+            r.push = push.abeam + f->x_d * push.turn;
+            if (spins)
+                z.yaw_rate = z.yaw_rate / (1.0 + slowing * fabs(z.yaw_rate));
+            const struct air air = air_at(f, kind, c, s, z.vx, z.vy, z.yaw_rate);
+            const double kq = kind == WITHOUT_DRAG ? 0.0 : f->k * air.q;
+            struct air middle = {
+                .u = (air.u + 0.5 * push.ahead) / (1.0 + at_most(0.5 * (kq * r.ahead))),
+                .w = (air.w + 0.5 * r.push) / (1.0 + at_most(0.5 * (kq * r.abeam))),
+            };
+            if (friction.rubs)
+                middle = rubbed_half(f, &r, &push, &of_half, c, s, &z, &air, &middle);
+            const double then = kind == WITHOUT_DRAG ? 0.0 : f->k * air_speed(f, kind, middle.u, middle.w);
+            double surge = push.ahead, sway = push.abeam, yaw = push.turn;
+            if (then != 0.0) {
+                const double lost = r.push - gained(air.w, r.push, then * r.abeam);
+                surge = gained(air.u, push.ahead, then * r.ahead);
+                sway = push.abeam - lost * r.of_sway;
+                yaw = push.turn - lost * r.of_yaw;
+            }
+            z.vx = z.vx + (c * surge - s * sway);
+            z.vy = z.vy + (s * surge + c * sway);
+            z.yaw_rate = z.yaw_rate + yaw;
+            const double driven = fabs(z.yaw_rate);
+            if (spins)
+                z.yaw_rate = z.yaw_rate / (1.0 + slowing * driven);
+            if (friction.rubs)
+                rub(&friction, &z.vx, &z.vy, &z.yaw_rate);
+            z.x = z.x + half * z.vx;
+            z.y = z.y + half * z.vy;
+            z.heading = z.heading + half * z.yaw_rate;
+            watch_loads(&watch, f, kind, then > kq ? then : kq, larger(begun, driven));
+            watch_yaw_rate(&watch, z.yaw_rate);
         }
-        z.vx = z.vx + (c * surge - s * sway);
-        z.vy = z.vy + (s * surge + c * sway);
-        z.yaw_rate = z.yaw_rate + yaw;
-        const double driven = fabs(z.yaw_rate);
-        if (spins)
-            z.yaw_rate = z.yaw_rate / (1.0 + slowing * driven);
-        if (friction.rubs)
-            rub(&friction, &z.vx, &z.vy, &z.yaw_rate);
-        z.x = z.x + half * z.vx;
-        z.y = z.y + half * z.vy;
-        z.heading = z.heading + half * z.yaw_rate;
-        watch_loads(&watch, f, kind, then > kq ? then : kq, larger(begun, driven));
-        watch_yaw_rate(&watch, z.yaw_rate);
-        if (is_over(&z, i + 1))
-            break;
-    }
+    while (i < n && is_finite(&z));
     return watched_stretch(f, &z, n, h, &watch);
 }
 
