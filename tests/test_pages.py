@@ -9,11 +9,12 @@ from xml.etree import ElementTree as ET
 import pytest
 from PIL import Image
 
+from hovercraft_fmu.autopilot import pilot_package
 from hovercraft_fmu.building import PRODUCTS
 from hovercraft_fmu.fmu import document
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from hovercraft_fmu.fmu.document import FOLDER
-from hovercraft_fmu.studies.pages import PICTURES, SHOWS, pages, shown
+from hovercraft_fmu.studies.pages import CHARTS, PICTURES, SHOWS, pages, shown, voyages
 from tests.shell import Shell
 
 SIZE_MAX, DOCUMENTS_MAX = 600_000, 16
@@ -49,11 +50,31 @@ def test_the_pages_say_what_the_tables_say(name: str) -> None:
 def test_the_pictures_show_what_the_tables_say(name: str) -> None:
     """A picture says of which tables it was drawn: its pixels depend on the version of matplotlib and on fonts."""
     if name.endswith(".svg"):
-        assert f"<dc:source>{shown(name)}</dc:source>" in (FOLDER / name).read_text(encoding="utf-8")
+        assert f"<dc:source>{shown(PICTURES[name])}</dc:source>" in (FOLDER / name).read_text(encoding="utf-8")
     else:
         with Image.open(FOLDER / name) as picture:
             assert picture.mode == "P"
-            assert picture.info[SHOWS] == shown(name)
+            assert picture.info[SHOWS] == shown(PICTURES[name])
+
+
+def test_the_pages_of_autopilot_and_tether_show_what_the_tables_say() -> None:
+    assert pilot_package.VOYAGES.read_bytes() == voyages()
+    for chart, (tables, _) in CHARTS.items():
+        assert f"<dc:source>{shown(tables)}</dc:source>" in chart.read_text(encoding="utf-8")
+
+
+def test_what_is_to_be_read_in_a_picture_is_not_cut() -> None:
+    """The numbers of its lines are: 0.001 s, in the legend, became 0.0 s with them."""
+    legend = re.findall(r"integrator's error: (.*)</text>", (FOLDER / "coupling.svg").read_text(encoding="utf-8"))
+    assert legend == ["semi_implicit_euler, 0.001 s", "semi_implicit_euler, 0.02 s", "rk4, 0.1 s"]
+
+
+@pytest.mark.parametrize("name", ["results.html", "sweeps.html"])
+def test_tables_can_be_read(name: str) -> None:
+    """No ten columns, no 6.55e+04 runs."""
+    page = pages()[name].decode()
+    assert max(line.count("<th>") for line in re.findall(r"<tr>.*?</tr>", page, re.DOTALL)) < 10
+    assert re.findall(r">-?[\d.]+e\+0[0-6]<", page) == []
 
 
 @pytest.mark.parametrize("name", ["fmu", "autopilot"])
@@ -80,14 +101,13 @@ def test_no_page_shows_its_marks() -> None:
 
 def test_formulas_are_mathml_and_variables_are_in_groups() -> None:
     page = document.pages(NATIVE)["index.html"]
-    formulas = [
-        ET.fromstring(each.replace("&psi;", "p").replace("&rho;", "r")) for each in re.findall("<math.*?</math>", page)
-    ]
+    formulas = [ET.fromstring(re.sub("&([a-z]+);", r"\1", each)) for each in re.findall("<math.*?</math>", page)]
     texts = ["".join(each.itertext()).replace("\u2062", "*") for each in formulas]
     assert texts[:2] == ["w=v+r*xd", "q=u*u+w*w"]
     assert formulas[1].find("msqrt") is not None
-    assert texts[-1] == "I*drdt=N"
-    assert formulas[-1].find("mfrac") is not None
+    assert texts[-4] == "I*drdt=N"
+    assert formulas[-4].find("mfrac") is not None
+    assert "<msup><msub><mi>x</mi><mi>d</mi></msub><mn>2</mn></msup>" in pages()["results.html"].decode()
     assert "1 semi_implicit_euler, 2 drag_implicit, 3 rk4" in page
     assert page.index(">craft</th>") < page.index("<code>mass</code></td>")
     shown = re.findall(r"<tr><td><code>([\w.]+)</code></td>", page[page.index('id="variables"') :])
@@ -96,14 +116,19 @@ def test_formulas_are_mathml_and_variables_are_in_groups() -> None:
 
 @pytest.mark.once
 @pytest.mark.usefixtures("complete_native_fmu")
-def test_the_site_is_whole(shell: Shell) -> None:
-    """Every page of every FMU, and nothing that is referred to is missing."""
+def test_the_site_is_whole(shell: Shell, request: pytest.FixtureRequest) -> None:
+    """Every page of every FMU and SSP file, nothing that is referred to is missing, and a phone shows them whole."""
     shell.ok("docs")
     site = shell.folder / "build" / "docs"
     found = {page: Links(page.read_text(encoding="utf-8")).found for page in site.rglob("*.html")}
-    assert len(found[site / "index.html"]) == len([each for each in PRODUCTS.values() if each.name.endswith(".fmu")])
+    assert len(found[site / "index.html"]) == len(PRODUCTS)
     for page, links in found.items():
         assert all((page.parent / link).is_file() for link in links if not re.match("https?:|#|data:", link)), page
+    browser = request.getfixturevalue("browser")  # last: it may be skipped
+    with browser.new_page(viewport={"width": 360, "height": 800}) as phone:
+        for page in {each.name: each for each in found}.values():
+            phone.goto(page.as_uri())
+            assert phone.evaluate("document.documentElement.scrollWidth") == 360, page
 
 
 def assert_complete_and_small(fmu: Path) -> None:

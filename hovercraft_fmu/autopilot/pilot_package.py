@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..fmu.description import FMI_3_TYPES, Flavour
-from ..fmu.document import FOLDER, rendered
+from ..fmu.document import FOLDER, rendered, table_rows
 from ..fmu.machine_code import PLATFORMS
 from ..fmu.native_package import Papers, write_native_fmu
 from ..fmu.python_package import Content, write_python_fmu
@@ -17,6 +17,10 @@ from .pilot_native import AUTOPILOT, AUTOPILOT_NATIVE
 HERE = Path(__file__).parent
 PICTURE = "loop.png"
 """A voyage, as `hovercraft-fmu demo --loop` draws it."""
+CHART = "step_limit.svg"
+"""Of the longest communication step, as `hovercraft-fmu measure coupling` draws it."""
+VOYAGES = HERE / "voyages.md"
+"""What that measured of sixty voyages."""
 REQUIREMENTS = "externalDependencies.txt"
 """Of the hovercraft's documentation: it holds for this FMU, too."""
 
@@ -55,10 +59,11 @@ def _documents(flavour: Flavour) -> dict[str, bytes]:
         "law": law,
         "status": STATUS,
         "advice": ADVICE,
+        "voyages": table_rows(VOYAGES)[1:],
     }
     pages = {name: page.encode() for name, page in rendered(HERE, values).items()}
     needs = {} if flavour.native else {REQUIREMENTS: (FOLDER / REQUIREMENTS).read_bytes()}
-    return {**needs, PICTURE: (HERE / PICTURE).read_bytes(), **pages}
+    return {**needs, **{name: (HERE / name).read_bytes() for name in (PICTURE, CHART)}, **pages}
 
 
 CONTENT = Content(

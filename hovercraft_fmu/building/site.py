@@ -2,28 +2,27 @@
 
 import os
 import zipfile
-from collections.abc import Callable
 from html import escape
 from pathlib import Path
 
 from ..fmu.document import FOLDER
 from ..whole import temporary_folder, write_whole
-from . import PRODUCTS
+from . import PRODUCTS, Product
 
 PAGES = "documentation/"
 TITLE = "Hovercraft FMU: the pages of each file"
 
 
 def build_site(folder: str | os.PathLike[str]) -> Path:
-    """Write the pages of every FMU of this package below `folder`, which is made, and a page that lists them.
+    """Write the pages of every FMU and SSP file of this package below `folder`, and a page that lists them.
 
     Returns that page. Raises OSError: it cannot be written; NotCompiledError: there is no machine code.
     """
     folder, rows = Path(folder), []
     for kind, product in PRODUCTS.items():
-        if product.name.endswith(".fmu"):
-            _write_pages(product.write, folder / kind)
-            rows.append(f'<li><a href="{kind}/index.html">{product.name}</a>: {escape(product.purpose)}.</li>')
+        pages = _write_pages(product, folder / kind)
+        first = "index.html" if "index.html" in pages else next(name for name in pages if name.endswith(".html"))
+        rows.append(f'<li><a href="{kind}/{first}">{product.name}</a>: {escape(product.purpose)}.</li>')
     style = (FOLDER / "style.css").read_text(encoding="utf-8")
     head = f'<meta charset="utf-8">\n<title>{TITLE}</title>\n<style>\n{style}</style>'
     body = "\n".join([f"<h1>{TITLE}</h1>", "<ul>", *rows, "</ul>"])
@@ -32,9 +31,10 @@ def build_site(folder: str | os.PathLike[str]) -> Path:
     return folder / "index.html"
 
 
-def _write_pages(build: Callable[[Path], Path], folder: Path) -> None:
-    """Those that are inside an FMU."""
-    with temporary_folder() as place, zipfile.ZipFile(build(Path(place) / "pages.fmu")) as archive:
-        for name in archive.namelist():
-            if name.startswith(PAGES):
-                write_whole(folder / name.removeprefix(PAGES), archive.read(name))
+def _write_pages(product: Product, folder: Path) -> list[str]:
+    """Those that are inside a file, and their names."""
+    with temporary_folder() as place, zipfile.ZipFile(product.write(Path(place) / product.name)) as archive:
+        pages = [name for name in archive.namelist() if name.startswith(PAGES)]
+        for name in pages:
+            write_whole(folder / name.removeprefix(PAGES), archive.read(name))
+    return [name.removeprefix(PAGES) for name in pages]

@@ -45,7 +45,7 @@ def pages(flavour: Flavour = PYTHON, more: Iterable[str] = ()) -> dict[str, str]
         "integrators": INTEGRATORS,
         "presets": PRESETS,
         "drag_areas": DRAG_AREAS,
-        "checked": _checked(FOLDER / CHECKED[ordinary.identifier]),
+        "checked": table_rows(FOLDER / CHECKED[ordinary.identifier]),
         "own": flavour.model.listed(flavour.own_starts),
     }
     return rendered(FOLDER, values)
@@ -115,27 +115,30 @@ def _grouped(variables: Iterable[Variable]) -> dict[str, list[Variable]]:
     return groups
 
 
-GREEK = {"psi": "&psi;", "rho": "&rho;"}
-TOKEN = re.compile(r"([A-Za-z]+)(?:_([A-Za-z]+))?|([0-9.]+)|(.)")
-"""Of a formula: a name with or without an index, a number, a sign."""
+GREEK = {name: f"&{name};" for name in ("psi", "rho", "tau", "kappa", "omega")}
+TOKEN = re.compile(r"([A-Za-z]+)(?:_([A-Za-z]+))?(?:\^([0-9]))?|([0-9.]+)|(.)")
+"""Of a formula: a name with or without an index and a power, a number, a sign."""
+FRACTION = re.compile(r"(.*?)([\w^]+)/([\w^]+)(.*)")
 
 
 def _math(formula: str) -> Markup:
-    """A formula in one line as MathML, which browsers draw by themselves: names with indices, signs, sqrt(...)."""
+    """A formula in one line as MathML, which browsers draw: names with indices and powers, signs, a/b, sqrt(...)."""
 
     def drawn(text: str) -> str:
         if root := re.fullmatch(r"(.*)sqrt\((.*)\)", text):
             return f"{drawn(root[1])}<msqrt>{drawn(root[2])}</msqrt>"
-        if fraction := re.fullmatch(r"(.*?)(\w+)/(\w+)(.*)", text):
+        if fraction := FRACTION.fullmatch(text):
             top, bottom = (f"<mrow>{drawn(each)}</mrow>" for each in fraction.group(2, 3))
             return f"{drawn(fraction[1])}<mfrac>{top}{bottom}</mfrac>{drawn(fraction[4])}"
         found = ""
-        for name, index, number, sign in TOKEN.findall(text.replace(" ", "")):
-            name = GREEK.get(name, name)
+        for name, index, power, number, sign in TOKEN.findall(text.replace(" ", "")):
+            symbol = f"<mi>{GREEK.get(name, name)}</mi>"
             if index:
-                found += f"<msub><mi>{name}</mi><mi>{index}</mi></msub>"
-            elif name or number:
-                found += f"<mi>{name}</mi>" if name else f"<mn>{number}</mn>"
+                symbol = f"<msub>{symbol}<mi>{index}</mi></msub>"
+            if name:
+                found += f"<msup>{symbol}<mn>{power}</mn></msup>" if power else symbol
+            elif number:
+                found += f"<mn>{number}</mn>"
             else:
                 found += f"<mo>{'&#x2062;' if sign == '*' else escape(sign)}</mo>"
         return found
@@ -143,10 +146,10 @@ def _math(formula: str) -> Markup:
     return Markup(f'<math display="block">{drawn(formula)}</math>')  # noqa: S704 - formulas of these pages
 
 
-def _checked(table: Path) -> list[list[str]]:
-    """The rows of a table of checks, titles first; none for what was not checked yet: checking needs a build."""
+def table_rows(table: Path) -> list[list[str]]:
+    """The rows of a table in Markdown, titles first; none where there is none yet: checking needs a build."""
     lines = table.read_text(encoding="utf-8").splitlines() if table.exists() else []
-    return [line.strip("| ").split(" | ") for line in lines if not line.startswith("| ---")]
+    return [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in lines if not re.match(r"\| ?--", line)]
 
 
 def _limits(variable: Variable) -> str:

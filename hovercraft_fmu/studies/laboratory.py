@@ -148,4 +148,10 @@ def text(frame: pl.DataFrame) -> str:
 def _cell(value: Any) -> str:
     if value is None or value != value:  # NaN
         return ""
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    return three_digits(value) if isinstance(value, float) else str(value)
+
+
+def three_digits(value: float) -> str:
+    """'0.218', '2.34e-07', '27700': an exponent where the figure would be long only."""
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:.0f}" if 1e3 <= abs(rounded) < 1e7 else f"{value:.3g}"

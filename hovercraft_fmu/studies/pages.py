@@ -8,7 +8,7 @@ import csv
 import io
 import re
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,7 +39,8 @@ from ..view.diagram import draw_diagram
 from ..view.plots import plot_passage
 from ..view.tow_pictures import plot_tow
 from ..whole import temporary_folder, write_whole
-from . import closed_loop, owners, scene_terms, work_precision
+from . import closed_loop, owners, scene_terms, step_limit, tow, work_precision
+from .laboratory import text, three_digits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,6 +58,11 @@ PICTURES: Mapping[str, tuple[Path, ...]] = {
     "scene_terms.svg": (RESULTS / "scene_terms.csv",),
 }
 """Each picture of the pages, and what it shows."""
+CHARTS: Mapping[Path, tuple[tuple[Path, ...], Callable[..., "Figure"]]] = {
+    pilot_package.HERE / pilot_package.CHART: ((RESULTS / "coupling_limit.csv",), step_limit.draw),
+    tether_package.HERE / tether_package.CHART: ((RESULTS / "tow_limits.csv", RESULTS / "tow_growth.csv"), tow.draw),
+}
+"""Those of the pages of the autopilot and the tether: what they show, and what draws it."""
 
 
 def _turning_circle(*_tables: pl.DataFrame) -> "Figure":
@@ -75,8 +81,6 @@ DRAWN: Mapping[str, Callable[..., "Figure"]] = {
 """Those that are drawn of their tables alone, as lines."""
 COLORS = 24
 """Of a picture's palette: lines and markers need few."""
-COLORS_OF_LOOP = 32
-"""With fewer its two thrusters look alike."""
 SHOWS = "Shows"
 """The key in a picture under which it says what it shows."""
 
@@ -107,23 +111,29 @@ def _owned() -> dict[str, object]:
     }  # fmt: skip
 
 
-def shown(name: str) -> str:
+def shown(tables: Iterable[Path]) -> str:
     """A digest of what a picture shows."""
-    return digest({path.name: path.read_bytes() for path in PICTURES[name]})
+    return digest({path.name: path.read_bytes() for path in tables})
 
 
-def in_palette(picture: Path, shows: str, colors: int = COLORS) -> bytes:
-    """A PNG as small as it can be, which says what it shows."""
+def voyages() -> bytes:
+    """The table of the autopilot's page."""
+    return text(pl.read_csv(RESULTS / "coupling_voyages.csv").drop("voyage", "missed")).encode() + b"\n"
+
+
+def in_palette(picture: Path, shows: str) -> bytes:
+    """A PNG as small as it can be, which says what it shows; small areas (the thrusters) keep their colours."""
     with Image.open(picture) as colored:
-        image = colored.convert("RGB").quantize(colors, Image.Quantize.MEDIANCUT, kmeans=6, dither=Image.Dither.NONE)
+        image = colored.convert("RGB").quantize(COLORS, Image.Quantize.MAXCOVERAGE, kmeans=6, dither=Image.Dither.NONE)
     note, content = PngImagePlugin.PngInfo(), io.BytesIO()
     note.add_text(SHOWS, shows)
     image.save(content, "PNG", optimize=True, pnginfo=note)
     return content.getvalue()
 
 
+TAG = re.compile(r"<[^>]*>")
 LONG_NUMBER = re.compile(r"(?<=[ \"LM,(])(-?\d+\.\d)\d+(?=[ \"\n,)L])")
-"""In an SVG: what is behind the tenth of a point is not seen."""
+"""In a tag of an SVG: what is behind the tenth of a point is not seen. (Between tags is what is to be read.)"""
 
 
 def line_art(figure: "Figure", shows: str) -> bytes:
@@ -131,7 +141,7 @@ def line_art(figure: "Figure", shows: str) -> bytes:
     content = io.BytesIO()
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hovercraft", "path.simplify_threshold": 1.0}):
         figure.savefig(content, format="svg", dpi=72, metadata={"Date": None, "Creator": None, "Source": shows})
-    return LONG_NUMBER.sub(r"\1", content.getvalue().decode()).encode()
+    return TAG.sub(lambda tag: LONG_NUMBER.sub(r"\1", tag[0]), content.getvalue().decode()).encode()
 
 
 def assemble(results: Path = RESULTS) -> list[Path]:
@@ -142,15 +152,18 @@ def assemble(results: Path = RESULTS) -> list[Path]:
     files = {PACKED / name: content for name, content in pages().items()}
     for name, draw in DRAWN.items():
         tables = [pl.read_csv(path) for path in PICTURES[name] if path.suffix == ".csv"]
-        files[PACKED / name] = line_art(draw(*tables), shown(name))
+        files[PACKED / name] = line_art(draw(*tables), shown(PICTURES[name]))
+    for chart, (shows, charted) in CHARTS.items():
+        files[chart] = line_art(charted(*map(pl.read_csv, shows)), shown(shows))
+    files[pilot_package.VOYAGES] = voyages()
     with temporary_folder() as folder:
         _draw(Path(folder))
         for name in PICTURES.keys() - DRAWN.keys():
             picture = next((each / name for each in (Path(folder), results) if (each / name).exists()), None)
             if picture:
-                files[PACKED / name] = in_palette(picture, shown(name))
+                files[PACKED / name] = in_palette(picture, shown(PICTURES[name]))
         for package in (pilot_package, tether_package):
-            files[package.HERE / package.PICTURE] = in_palette(Path(folder) / package.PICTURE, "", COLORS_OF_LOOP)
+            files[package.HERE / package.PICTURE] = in_palette(Path(folder) / package.PICTURE, "")
         files[RESULT] = default_result(build_native_fmu(Path(folder) / "HovercraftNative.fmu"))
     for path, content in files.items():
         write_whole(path, content)
@@ -195,7 +208,7 @@ def _short(text: str) -> str:
         return text
     if number != number:  # NaN
         return ""
-    return text if text.isdecimal() else f"{number:.3g}"
+    return text if text.isdecimal() else three_digits(number)
 
 
 if __name__ == "__main__":

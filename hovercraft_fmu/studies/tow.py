@@ -290,6 +290,8 @@ def _cost(free: pl.DataFrame) -> str:
     )
 
 
+RATIOS, TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0), (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
+"""Figures on the axes."""
 STYLES = {GAUSS_SEIDEL: (OTHER, "v"), JACOBI: (INK, "P"), WITH_DERIVATIVES: (SEA, "o")}
 
 
@@ -304,6 +306,9 @@ def draw(found: pl.DataFrame, grown: pl.DataFrame) -> "Figure":
         own = found.filter(scheme=scheme)
         chart.loglog(own["damping_ratio"], own["limit"], color=color, marker=marker, linestyle="none", label=scheme)
         chart.loglog(ratios, [curve(z) for z in ratios.tolist()], color=color, linewidth=1.0)
+    for axis, ticks in ((chart.xaxis, RATIOS), (chart.yaxis, TICKS)):
+        axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+        axis.set_ticks([], minor=True)
     chart.set_xlabel("damping ratio of the line")
     chart.set_ylabel("largest stable H*w")
     chart.set_title("Stable below; lines: theory", loc="left")

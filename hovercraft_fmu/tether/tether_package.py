@@ -16,6 +16,8 @@ from .tether_native import TETHER, TETHER_NATIVE
 HERE = Path(__file__).parent
 PICTURE = "tow.png"
 """As `hovercraft-fmu demo --tow` draws it."""
+CHART = "step_limit.svg"
+"""Of the longest communication step, as `hovercraft-fmu measure coupling` draws it."""
 REQUIREMENTS = "externalDependencies.txt"
 """Of the hovercraft's documentation: it holds for this FMU, too."""
 
@@ -43,7 +45,7 @@ def _documents(flavour: Flavour) -> dict[str, bytes]:
     }
     pages = {name: page.encode() for name, page in rendered(HERE, values).items()}
     needs = {} if flavour.native else {REQUIREMENTS: (FOLDER / REQUIREMENTS).read_bytes()}
-    return {**needs, PICTURE: (HERE / PICTURE).read_bytes(), **pages}
+    return {**needs, **{name: (HERE / name).read_bytes() for name in (PICTURE, CHART)}, **pages}
 
 
 CONTENT = Content(
