@@ -33,7 +33,7 @@ from hovercraft_fmu.model.subcycling import Settings, meant_step, substeps
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Value
 from hovercraft_fmu.studies import carry_out, sweep_costs
-from hovercraft_fmu.sweeps import STUDIES, cluster, load, read_study, sweep
+from hovercraft_fmu.sweeps import STUDIES, chunks, cluster, load, read_study, sweep
 from hovercraft_fmu.sweeps import runner as runner_module
 from hovercraft_fmu.sweeps.charts import plot_sweep
 from hovercraft_fmu.sweeps.engines import Plan
@@ -677,28 +677,35 @@ def test_a_killed_sweep_goes_on_and_loses_nothing(fmu: Path, tmp_path: Path) -> 
         assert loaded(tmp_path / "killed", what).equals(loaded(tmp_path / "whole", what))
 
 
-@pytest.mark.parametrize("engine", ["fmu", "batch"])
-@pytest.mark.parametrize("keep", [{"end": ["speed"]}, {"maximum": list(OBSERVED)}], ids=["end", "maximum"])
-@pytest.mark.usefixtures("fleet")
-def test_a_chunk_has_a_bounded_size(engine: str, keep: dict[str, Any], native_fmu: Path, tmp_path: Path) -> None:
-    """The first one of many is whole when the sweep is ended after it."""
+def chunk_of(study: dict[str, Any], fmu: Path | None = None, runs: int = 10**9, **swept: Any) -> int:
+    """Runs in a chunk of a study with so many."""
+    latin = {"method": "latin_hypercube", "runs": runs, "seed": 1}
+    chosen = read_study(but(study, sweep={"mass": RANGE, **swept}, sampling=latin))
+    job = runner_module._job(chosen, fmu, "fmu" if fmu else "batch", place_of("nowhere"))
+    return int(job.about["chunk"])
 
-    class EndError(Exception):
-        pass
 
-    def end(made: int) -> None:
-        if made:
-            raise EndError
+def test_a_chunk_is_some_seconds_of_counted_work(fmu: Path, native_fmu: Path) -> None:
+    """Half the sub-step, half the runs; where memory is short, as many as it holds. Nothing is timed."""
+    fine, finer = (but(set={"integrator": "semi_implicit_euler", "step_size": h}) for h in (1e-4, 5e-5))
+    assert chunk_of(fine) == pytest.approx(2 * chunk_of(finer), rel=0.02)
+    assert chunk_of(fine, runs=10**5) == chunk_of(fine)
+    # a sub-step of Euler's takes some 7 ns in the batch, 30 in the native FMU, 900 in Python
+    usual = but(set={"integrator": "semi_implicit_euler", "step_size": 1e-3})
+    for path, nanoseconds in ((None, 7.0), (native_fmu, 30.0), (fmu, 900.0)):
+        assert 1.0 < chunk_of(usual, path) * 60_000 * 1e-9 * nanoseconds < 5.0
+    for every in (0.1, 0.3):  # each value of 8 bytes is there some times
+        points = but(keep={"trajectory": {"every": every, "of": list(OBSERVED)}})
+        assert 0.05 < chunk_of(points) * 8 * len(OBSERVED) * (60.0 / every) / chunks.MOST_BYTES < 0.5
+    assert [chunk_of(MASSES, runs=runs) for runs in (1, 2, 100)] == [1, 1, 50]
+    assert [chunk_of(MASSES, native_fmu, runs=runs) for runs in (32, 3200)] == [1, 100]
 
-    many = {"method": "latin_hypercube", "runs": 100000, "seed": 1}
-    study = but(sweep={"mass": RANGE}, sampling=many, keep=keep)
-    with pytest.raises(EndError):
-        sweep(study, native_fmu if engine == "fmu" else None, engine=engine, workers=1, output=tmp_path, tell=end)
-    (chunk,) = (tmp_path / "runs").glob("*.parquet")
-    runs = pq.read_metadata(chunk).num_rows
-    assert 1 < runs <= runner_module.MOST_RUNS[engine]
-    if "maximum" in keep:
-        assert runs * 601 * len(OBSERVED) <= runner_module.MOST_VALUES
+
+def test_swept_settings_count_on_average() -> None:
+    one, other, both = (
+        chunk_of(but(set={"integrator": "splitting"}), step_size=sizes) for sizes in ([1e-4], [1e-3], [1e-4, 1e-3])
+    )
+    assert both == pytest.approx(2.0 / (1.0 / one + 1.0 / other), rel=0.01)
 
 
 # ---- on workers

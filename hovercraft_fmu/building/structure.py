@@ -95,7 +95,7 @@ def write_ssp(path: str | os.PathLike[str], system: System) -> Path:
         OSError: a file cannot be read or written.
     """
     held = dict.fromkeys(name for part in system.components for name in part.held)
-    python = any(_is_python(fmu) for fmu in _fmus(system))
+    python = any(is_python(fmu) for fmu in _fmus(system))
     page = rendered(HERE, {"system": system, "held": tuple(held), "python": python})[TEMPLATE]
     files = {
         "SystemStructure.ssd": xml(system_structure(system)),
@@ -110,7 +110,8 @@ def _fmus(system: System) -> list[Path]:
     return list(dict.fromkeys(part.fmu for part in system.components))
 
 
-def _is_python(fmu: Path) -> bool:
+def is_python(fmu: Path) -> bool:
+    """Whether it carries its model as Python."""
     with zipfile.ZipFile(fmu) as archive:
         return any(name.startswith("resources/") and name.endswith(".py") for name in archive.namelist())
 

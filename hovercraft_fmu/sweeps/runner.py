@@ -15,11 +15,13 @@ from typing import Any, NamedTuple, TypeAlias
 
 from .._version import __version__
 from ..building import default_fmu
+from ..building.structure import is_python
 from ..fmu.interface import HOVERCRAFT
 from ..fmu.near_names import explains_keywords, must_be_one_of
 from ..host import read_description
 from ..model.error_estimate import ON
 from ..simulation.fmu_run import own_starts
+from .chunks import BATCH_COSTS, NATIVE_COSTS, PYTHON_COSTS, chunk_size
 from .engines import SETTINGS, Plan
 from .place import Place, place_of
 from .store import RUNS, TRAJECTORIES, WHOLE, Part, Store, store
@@ -33,15 +35,9 @@ Tell: TypeAlias = Callable[[int], None]
 
 FMU, BATCH = "fmu", "batch"
 ENGINES = (FMU, BATCH)
-MOST_RUNS = {FMU: 500, BATCH: 8000}
-"""In a chunk: what a killed sweep makes anew, at most, for each worker."""
 LEAST_CHUNKS = {FMU: 32, BATCH: 2}
 """So that there is work for some workers."""
 FOLDER_NAME = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
-MOST_VALUES = 2**22
-"""That a chunk reads (32 MB): so memory stays bounded where whole trajectories are read."""
-MOST_SUBSTEPS = 10**6
-"""Of a chunk of runs of the FMU: a second of the Python FMU's."""
 
 
 class Outcome(NamedTuple):
@@ -178,7 +174,7 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place: P
     """What goes to the workers."""
     if engine not in ENGINES:
         raise ValueError(must_be_one_of("engine", engine, ENGINES))
-    content = None
+    content, costs = None, BATCH_COSTS
     if engine == BATCH:
         if fmu is not None:
             raise ValueError(
@@ -187,7 +183,9 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place: P
         if study.run.value("error_estimate") == ON or any(each.name == "error_estimate" for each in study.factors):
             raise ValueError("error_estimate: must be off with the engine batch, which tells no error; take engine fmu")
     else:
-        content, own = _content(study, Path(fmu or default_fmu()))
+        path = Path(fmu or default_fmu())
+        content, own = _content(study, path)
+        costs = PYTHON_COSTS if is_python(path) else NATIVE_COSTS
         study = replace(study, run=study.run.on(own))
     plan = Plan(study.run, study.keep, timeline(study.run, study.keep))
     about = {
@@ -197,7 +195,7 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place: P
         "fmu_sha256": hashlib.sha256(content).hexdigest() if content else None,
         "hovercraft_fmu": __version__,
         "runs": study.runs,
-        "chunk": _chunk(plan, study.runs, engine),
+        "chunk": chunk_size(plan, study.sampling, costs, LEAST_CHUNKS[engine]),
         "name": study.name,
         "swept": [factor.name for factor in study.factors],
         "kept": list(study.keep.columns),
@@ -209,16 +207,6 @@ def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place: P
         "machine": f"{platform.system()} {platform.machine()}",
     }  # fmt: skip
     return Job(uuid.uuid4().hex, __version__, plan, study.sampling, content, about, place)
-
-
-def _chunk(plan: Plan, runs: int, engine: str) -> int:
-    """Runs in a chunk. It follows from the study alone, so that a sweep can go on with other workers."""
-    values = len(plan.timeline.times) * max(1, len(plan.keep.read))
-    most = min(MOST_RUNS[engine], -(-runs // LEAST_CHUNKS[engine]), MOST_VALUES // values)
-    if engine == FMU:
-        substeps = (plan.run.stop_time - plan.run.start_time) / float(plan.run.value("step_size"))
-        most = min(most, int(MOST_SUBSTEPS / substeps))
-    return max(1, most)
 
 
 def _content(study: Study, path: Path) -> tuple[bytes, dict[str, float | int]]:
