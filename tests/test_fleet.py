@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from hovercraft_fmu import advance_fleet
 from hovercraft_fmu.examples import cloud
-from hovercraft_fmu.host.fleet import Crafts, observe_fleet
+from hovercraft_fmu.fmu.machine_code import C_FOLDER, FLEET, Library, NotCompiledError
+from hovercraft_fmu.host.fleet import Crafts, _library, observe_fleet
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
-from hovercraft_fmu.model.integrators import INTEGRATORS
+from hovercraft_fmu.model.integrators import ADAPTIVE, INTEGRATORS
 from hovercraft_fmu.model.subcycling import Settings
 from hovercraft_fmu.simulation import held_steps, plan
 from tests.native import IN_TURN, KERNEL_FILES, STEPS, Kernel, compile_c
@@ -162,7 +163,8 @@ def test_rows_are_read_where_they_are_and_never_written_into() -> None:
 
 
 def test_no_craft_one_craft_and_a_step_of_no_time() -> None:
-    assert advance_fleet(np.empty((6, 0)), Controls(5.0), Craft(), 0.1).states.shape == (6, 0)
+    for none in (Craft(), Crafts(mass=[])):
+        assert advance_fleet(np.empty((6, 0)), Controls(5.0), none, 0.1).states.shape == (6, 0)
     one = advance_fleet(State(vx=0.3), Controls(5.0), Craft(), 0.0)
     assert tuple(one.states[:, 0]) == State(vx=0.3)
     assert one.substeps.tolist() == [0]
@@ -227,6 +229,35 @@ def test_each_refusal_has_its_reason(name: str) -> None:
     found = advance_fleet(State(vx=1.0), Controls(), Crafts(mass=[100.0, 101.0]), step, way, slopes)
     assert str(found.refused[1]).startswith(says)
     assert tuple(found.states[:, 1]) == State(vx=1.0)
+
+
+def test_too_many_steps_of_the_adaptive_method(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the limit is a thousand steps; of 10^8 one sees nothing in a minute."""
+    files = [C_FOLDER / FLEET / "fleet.c"]
+    options = ("-DHOVERCRAFT_MAX_TRIED=1000", "-O0", "-Wno-psabi", "-shared", "-fPIC", "-lm")
+    few = compile_c(tmp_path / "few.so", files, *options)
+    monkeypatch.setattr(Library, "path", lambda *_: few)
+    _library.cache_clear()
+    spun = advance_fleet(State(), Controls(0.0, 1.0), Craft(drag_coefficient=0.0), 86400.0, Settings(1.0, ADAPTIVE))
+    _library.cache_clear()
+    assert str(spun.refused[0]) == (
+        "communication step = 86400.0 s: must not need more than 10^8 sub-steps to meet tolerance = 1e-06; set a "
+        "larger tolerance, or take a shorter step"
+    )
+
+
+@pytest.mark.parametrize("machine", ["riscv64", "sparc"])
+def test_a_machine_without_machine_code(machine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    _library.cache_clear()
+    with pytest.raises(NotCompiledError, match=f"no machine code of HovercraftFleet for {machine}-"):
+        advance_fleet(State(), Controls(), Craft(), 0.1)
+
+
+def test_what_is_no_parameter_of_crafts() -> None:
+    assert Crafts(mass=[1.0, 2.0]).mass.tolist() == [1.0, 2.0]
+    with pytest.raises(AttributeError, match="weight"):
+        Crafts().weight  # noqa: B018
 
 
 def test_what_is_seen_of_them(kernel: Kernel) -> None:

@@ -1,13 +1,16 @@
 """The way in which the package drives an FMU: the same calls for both standards, co-simulation and model exchange."""
 
 from collections.abc import Iterator
+from ctypes import ArgumentError
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hovercraft_fmu.fmu.interface import STATES
 from hovercraft_fmu.host import Fmu, Instance, SimulationError
+from hovercraft_fmu.host.messages import CALLBACKS_2
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, derivatives
 from hovercraft_fmu.model.integrators import integrator
@@ -147,6 +150,46 @@ def test_model_exchange(each_native_fmu: Path) -> None:
         assert list(rates) == pytest.approx(derivatives(start._replace(heading=1.0), Controls(), Craft()), rel=1e-12)
         assert not craft.complete_step()
         craft.enter_event_mode()
+
+
+def test_an_fmu_that_asks_to_end_is_heard(native3_fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one of another maker may: in a step, and to a solver."""
+
+    def done_and_ends(*arguments: Any) -> int:
+        _, ends, _, last = (argument._obj for argument in arguments[-4:])
+        ends.value, last.value = True, 0.25
+        return 0
+
+    with Fmu(native3_fmu) as opened, opened.instance() as craft:
+        monkeypatch.setattr(craft, "_do_step", done_and_ends)
+        with pytest.raises(SimulationError, match=r"the FMU asks to end at 0\.25 s"):
+            craft.step(0.0, 0.5)
+    with Fmu(native3_fmu) as opened, opened.instance(exchange=True) as craft:
+        monkeypatch.setattr(craft.fmpy, "completedIntegratorStep", lambda: (False, True))
+        with pytest.raises(SimulationError, match="the FMU asks to end"):
+            craft.complete_step()
+
+
+def test_what_is_wrong_before_the_fmu_is_called_is_no_refusal_of_it(craft: Instance) -> None:
+    with pytest.raises(ArgumentError):
+        craft.enter_initialization(start_time="now")  # type: ignore[arg-type]
+
+
+def test_a_text_is_no_number(craft: Instance, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(craft._variable("thrust"), "type", "String")
+    with pytest.raises(ValueError, match="thrust: must be a number; it is of the type String"):
+        craft.port("thrust")
+
+
+def test_closed_twice_is_closed_once(opened: Fmu) -> None:
+    craft = opened.instance()
+    craft.close()
+    craft.close()
+
+
+def test_who_is_gone_hears_nothing() -> None:
+    """The logger is the process's; a name that no instance has any more is nobody's."""
+    CALLBACKS_2.logger(None, b"gone", 3, b"logStatusError", b"what")
 
 
 def test_an_fmu_without_model_exchange(fmu: Path) -> None:

@@ -208,11 +208,12 @@ def _refusals(parameters: Mapping[str, Array], derived: Mapping[str, Array], cou
 
 def _refusal(constants: Any) -> str:
     """Why there cannot be such a craft; '' where there can."""
+    why = ""
     try:
         Craft(**constants)
     except ValueError as error:
-        return str(error)
-    return ""
+        why = str(error)
+    return why
 
 
 def _constants(parameters: Mapping[str, Array], i: int) -> Any:

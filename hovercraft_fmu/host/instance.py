@@ -196,11 +196,8 @@ class Instance:
         try:
             return function(*arguments)
         except Exception as error:
-            status = getattr(error, "status", None)
-            if status is None:  # not the FMU's
-                raise
-            self.check(status)
-            raise
+            self.check(getattr(error, "status", 0))
+            raise  # it is not the FMU's
 
     @contextmanager
     def driven_by_fmpy(self) -> Iterator[None]:

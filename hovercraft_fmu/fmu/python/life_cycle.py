@@ -3,7 +3,8 @@
 import hashlib
 import json
 import math
-from collections.abc import MutableMapping
+from abc import abstractmethod
+from collections.abc import Callable, MutableMapping
 from typing import Any, ClassVar, NoReturn, TypeVar
 
 from ...model.subcycling import check_tolerance, rounding
@@ -282,36 +283,35 @@ class Slave(WrappedSlave):
 
     # ---- what is the model's own
 
+    @abstractmethod
     def _check_value(self, variable: Variable, value: float) -> None:
         """Raises ValueError where a value alone is impossible; it is a finite number."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _take_up_start_values(self) -> None:
         """Make the state from the start values. Raises ValueError where they are impossible together."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _advance(self, time: float, step_size: float) -> None:
         """Go on from a time by a communication step [s], or raise and change nothing."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _observe(self) -> dict[int, float]:
         """The Reals of the communication point that are worked out, but for those on demand."""
-        raise NotImplementedError
 
     def _observe_discrete(self) -> None:
         """Bring Integers and Booleans up to the communication point, where they are not always there."""
 
-    def _observe_on_demand(self) -> dict[int, float]:
-        """The rest of the Reals, which most hosts never ask for."""
-        raise NotImplementedError
+    _observe_on_demand: Callable[[], dict[int, float]]
+    """The rest of the Reals, which most hosts never ask for: a method of models that have some."""
 
+    @abstractmethod
     def _own_state(self) -> dict[str, Any]:
         """What the FMU state has beside inputs, parameters, Integers and Booleans."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _set_own_state(self, state: dict[str, Any]) -> None:
         """Take it back."""
-        raise NotImplementedError
 
 
 def refuse_non_finite(names: tuple[str, ...], values: tuple[float, ...]) -> None:

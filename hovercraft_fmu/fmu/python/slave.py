@@ -109,7 +109,7 @@ class HovercraftSlave(Slave):
         if rotation > method.rotation_limit:
             self._warn_of_rotation(rotation, method)
         if self._companion:
-            self._warn_of_error(min(step_size, self._settings.step_size))
+            self._warn_of_error(self._companion, min(step_size, self._settings.step_size))
         thrust, port, starboard = controls[:3]
         if not (craft.thrust_min <= thrust <= craft.thrust_max and 0.0 <= port <= 1.0 and 0.0 <= starboard <= 1.0):
             self._warn_of_held_inputs()
@@ -130,17 +130,15 @@ class HovercraftSlave(Slave):
             f"step_size below {step:.3g} s, or the integrator adaptive",
         )
 
-    def _error(self) -> tuple[float, float]:
-        """m, rad: by its companion, at the communication point; 0 where it has none."""
-        if not self._companion:
-            return 0.0, 0.0
-        return estimated_error(self._state, self._companion, self._craft, self._settings.integrator)
+    def _error(self, beside: Companion) -> tuple[float, float]:
+        """m, rad: by its companion, at the communication point."""
+        return estimated_error(self._state, beside, self._craft, self._settings.integrator)
 
-    def _warn_of_error(self, substep: float) -> None:
-        beside, position = self._companion, self._error()[0]
+    def _warn_of_error(self, beside: Companion, substep: float) -> None:
+        position = self._error(beside)[0]
         setting = "step_size" if self._settings.integrator.integrate else "tolerance"
         h = substep if setting == "step_size" else 0.0
-        if beside and is_lost(position, self._state, beside, self._craft, h, self._integers[SUBSTEPS]):
+        if is_lost(position, self._state, beside, self._craft, h, self._integers[SUBSTEPS]):
             self._warn(
                 ERROR_LOST,
                 f"error.position = {position:.4g} m after a way of {beside.way:.4g} m: cannot be trusted; set a "
@@ -239,7 +237,8 @@ class HovercraftSlave(Slave):
         if not math.isfinite(motion[-1]):  # the speed overflows first
             refuse_non_finite(MOTION, motion)
         seen = dict(zip(MOTION_REFERENCES, self._state + motion))  # noqa: B905 - of one length
-        return seen | (dict(zip(ERROR_REFERENCES, self._error(), strict=True)) if self._companion else NO_ERROR)
+        beside = self._companion
+        return seen | (dict(zip(ERROR_REFERENCES, self._error(beside), strict=True)) if beside else NO_ERROR)
 
     def _observe_on_demand(self) -> dict[int, float]:
         action = observe_action(self._state, self._controls, self._craft)
