@@ -4,13 +4,14 @@ import csv
 import itertools
 import json
 import math
+import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
+from fsspec import filesystem
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
@@ -34,12 +36,14 @@ from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Value
 from hovercraft_fmu.studies import carry_out, sweep_costs
 from hovercraft_fmu.sweeps import STUDIES, chunks, cluster, load, read_study, sweep
+from hovercraft_fmu.sweeps import place as place_module
 from hovercraft_fmu.sweeps import runner as runner_module
 from hovercraft_fmu.sweeps.charts import plot_sweep
 from hovercraft_fmu.sweeps.engines import Plan
-from hovercraft_fmu.sweeps.place import place_of
+from hovercraft_fmu.sweeps.place import Place, place_of
 from hovercraft_fmu.sweeps.quantities import FORMULAS, OBSERVED
 from hovercraft_fmu.sweeps.sampling import Factor, Sampling
+from hovercraft_fmu.sweeps.seen import check_seen
 from hovercraft_fmu.sweeps.timeline import Leg, merged, timeline
 from hovercraft_fmu.sweeps.work import DRIVERS, Job, make_chunk
 from tests.conftest import FMI_2
@@ -589,6 +593,115 @@ sweep({MASSES}, engine="batch", workers=1, output={str(tmp_path / "killed")!r},
     assert sweep(MASSES, engine="batch", workers=1, output=tmp_path / "killed").new == 3
 
 
+def test_parts_are_the_whole(tmp_path: Path) -> None:
+    """To the bit, made at the same time; each says what is missing yet of the whole."""
+    study = but(KEPT, sweep={"mass": RANGE}, sampling={"method": "latin_hypercube", "runs": 7, "seed": 1})
+    once = sweep(study, engine="batch", workers=1, output=tmp_path / "whole")
+    there = tmp_path / "parts"
+
+    def meanwhile(done: int) -> None:
+        if not done:
+            made = sweep(study, engine="batch", workers=1, output=there, part="2/3")
+            assert (made.runs, made.new, made.missing) == (3, 3, 4)
+            with pytest.raises(ValueError, match="another sweep is at work here"):
+                sweep(study, engine="batch", workers=1, output=there)
+            with pytest.raises(ValueError, match=r"holds the results of another sweep \(study differ\)"):
+                sweep(but(study, stop_time=30.0), engine="batch", workers=1, output=there, part="3/3")
+
+    first = sweep(study, engine="batch", workers=1, output=there, part="1/3", tell=meanwhile)
+    assert (once.runs, first.runs, first.new, first.missing) == (7, 4, 4, 0)
+    assert sweep(study, engine="batch", workers=1, output=there, part="3/3").runs == 0  # there are two chunks
+    for what in ("runs", "trajectories"):
+        assert load(there, what).to_table().equals(load(tmp_path / "whole", what).to_table())
+    with pytest.raises(ValueError, match="overwrite: must not be given with part"):
+        sweep(study, engine="batch", workers=1, output=there, part="1/3", overwrite=True)
+
+
+@pytest.mark.parametrize("part", ["3/2", "0/2", "x", "1/0", "-1/2", "1/2/3", "1.0/2", "", "1"])
+def test_a_part_that_is_none(part: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=f"part = '{part}': must be k/n with k from 1 to n, as 2/8"):
+        sweep(MASSES, engine="batch", output=tmp_path / "new", part=part)
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.fixture
+def memory() -> Iterator[str]:
+    """An address of a store of objects in this process, empty."""
+    yield "memory://bucket/sweep"
+    filesystem("memory").rm("/bucket", recursive=True)
+
+
+@pytest.mark.parametrize("aside", [False, True], ids=["put whole", "renamed"])
+def test_a_sweep_at_an_address_is_that_of_a_folder(
+    aside: bool, memory: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And goes on there, is whole again where it was spoiled, refuses another study, is overwritten by one."""
+    if aside:  # as over SFTP
+        monkeypatch.setattr(place_module, "PUT_WHOLE", set())
+    sweep(KEPT, engine="batch", workers=1, output=tmp_path)
+    outcome = sweep(KEPT, engine="batch", workers=1, output=memory)
+    assert (outcome.folder, outcome.new) == (memory, 6)
+    for what in ("runs", "trajectories"):
+        assert names_at(f"{memory}/{what}") == ["00000.parquet", "00001.parquet"]
+        assert load(memory, what).to_table().equals(load(tmp_path, what).to_table())
+    file = "/bucket/sweep/runs/00001.parquet"
+    filesystem("memory").pipe(file, filesystem("memory").cat(file)[:-100])
+    outcome = sweep(KEPT, engine="batch", workers=1, output=memory)
+    assert (outcome.new, len(outcome.spoiled)) == (3, 1)
+    assert names_at(f"{memory}/runs") == [".00001.parquet.spoiled", "00000.parquet", "00001.parquet"]
+    assert load(memory).to_table().equals(load(tmp_path).to_table())
+    with pytest.raises(ValueError, match=rf"{memory}: holds the results of another sweep \(study differ\)"):
+        sweep(MASSES, engine="batch", workers=1, output=memory)
+    assert sweep(MASSES, engine="batch", workers=1, output=memory, overwrite=True).new == 6
+    assert names_at(f"{memory}/trajectories") == []
+
+
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("nix://here", "must be a folder, or an address as s3://bucket/folder; ValueError: Protocol not known: nix"),
+        ("s3://me:secret@bucket/a", "output = 's3://bucket/a': must be without credentials and options"),
+        ("s3://bucket/a?secret=secret", "output = 's3://bucket/a': must be without credentials and options"),
+        ("gs://bucket/a", "output = 'gs://bucket/a': must be of a store whose library is installed: pip install gcsfs"),
+    ],
+)
+def test_an_address_that_cannot_be(address: str, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "gcsfs", None)
+    with pytest.raises(ValueError, match=re.escape(message)) as refused:
+        sweep(MASSES, engine="batch", workers=1, output=address)
+    assert "secret" not in str(refused.value)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_permission(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(PermissionError, match=str(tmp_path / "new")):
+        sweep(MASSES, engine="batch", workers=1, output=tmp_path / "new")
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+def test_memory_does_not_depend_on_the_runs(tmp_path: Path) -> None:
+    """Of a process that makes runs of a billion, as many at a time as memory allows."""
+    study = but(
+        sweep={"mass": RANGE, "inertia": {"normal": [500.0, 9.0]}},
+        sampling={"method": "latin_hypercube", "runs": 10**9, "seed": 1},
+        keep={"trajectory": {"every": 0.1, "of": ["pose.x", "pose.y"]}},
+    )
+    code = f"""
+from hovercraft_fmu.sweeps import sweep
+def tell(runs):
+    if runs:
+        lines = open("/proc/self/status").readlines()
+        print(runs, next(line.split()[1] for line in lines if line.startswith("VmHWM:")))
+        raise SystemExit
+sweep({study}, engine="batch", workers=1, output={str(tmp_path)!r}, tell=tell)
+"""
+    made = subprocess.run([sys.executable, "-c", code], timeout=60, check=True, capture_output=True, text=True)
+    runs, kilobytes = map(int, made.stdout.split())
+    assert runs > 500
+    assert kilobytes < 250e3
+
+
 @pytest.mark.parametrize("name", ["..", "a b", "ä", ".hidden", "a/b"])
 def test_a_study_that_names_no_folder_is_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -720,6 +833,10 @@ def test_the_bits_do_not_depend_on_who_makes_the_runs(fmu: Path, native3_fmu: Pa
     with distributed.LocalCluster(**cluster, dashboard_address="127.0.0.1:0") as there:
         for path in (fmu, native3_fmu):
             assert_the_bits_are_those_of(there.scheduler_address, path, tmp_path / path.stem)
+        # memory is each process's own
+        with pytest.raises(OSError, match=r"2 of 2 do not: tcp://.*, tcp://.* \(what is written here is not there\)"):
+            sweep(MASSES, fmu, scheduler=there.scheduler_address, output="memory://blind")
+    assert names_at("memory://blind") == ["sweep.json"]
 
 
 def assert_the_bits_are_those_of(scheduler: str, fmu: Path, folder: Path) -> None:
@@ -744,6 +861,31 @@ def assert_the_bits_are_those_of(scheduler: str, fmu: Path, folder: Path) -> Non
 
 def _drivers() -> int:
     return len(DRIVERS)
+
+
+class Elsewhere:
+    """A worker whose folder is another one, with what was there at first."""
+
+    def run(self, function: Callable[..., Any], place: Place, mark: str, on_error: str) -> dict[str, Any]:
+        assert on_error == "return"
+        there = Path(place.address).with_name("elsewhere")
+        shutil.copytree(place.address, there)
+        return {"tls://10.0.0.2:4000": function(place_of(there), mark)}
+
+
+def test_a_place_that_a_worker_does_not_see_is_refused(tmp_path: Path) -> None:
+    """In either direction; and by a worker that comes later, at its first chunk. Nothing is left of the trial."""
+    with pytest.raises(OSError, match=r"1 of 1 do not: tls://10\.0\.0\.2:4000 \(what it writes is not here\)"):
+        check_seen(Elsewhere(), place_of(tmp_path / "here"))
+    assert names_at(str(tmp_path / "here")) == []
+    job = runner_module._job(read_study(MASSES), None, "batch", place_of(tmp_path / "there"))
+    with pytest.raises(OSError, match="must be a place that every worker sees"):
+        make_chunk(job, 0)
+    assert not (tmp_path / "there").exists()
+
+
+def names_at(address: str) -> list[str]:
+    return sorted(place_of(address).names(""))
 
 
 @pytest.mark.once

@@ -44,9 +44,11 @@ WAYS = (
     *(Way(NATIVE, END, workers, runs) for workers in (1, 2) for runs in (100, 1000, 10000, 100000)),
     *(Way(NATIVE, EVERY, workers, 10000) for workers in (1, 2)),
     *(Way(BARE, END, 1, runs) for runs in (100, 1000, 10000, 100000)),
-    Way(BARE, END, 2, 100000),
+    *(Way(BARE, END, 2, runs) for runs in (1000, 100000, 1000000, 10000000)),
 )
-"""A run costs the same in fmpy's own way however many there are: a hundred are enough; of the Python FMU, 10 000."""
+"""The batch with two workers tells that memory does not depend on the runs.
+
+A run costs the same in fmpy's own way however many there are: a hundred are enough; of the Python FMU, 10 000."""
 QUICK = tuple(Way(way, END, 1, 100) for way in (FMPY, PYTHON, NATIVE, BARE))
 
 

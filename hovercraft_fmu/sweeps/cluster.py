@@ -11,6 +11,7 @@ from distributed.comm.addressing import get_address_host_port
 from distributed.security import Security
 
 from ..host import SimulationError
+from .seen import check_seen
 from .work import Job, Made, make_chunk, release
 from .workers import Todo
 
@@ -37,12 +38,13 @@ def made_on(scheduler: Scheduler, job: Job, todo: Todo) -> Generator[Made, None,
 
     Raises:
         ValueError: what is no address; files for TLS that do not fit; a scheduler without a worker.
-        OSError: a scheduler that cannot be reached.
+        OSError: a scheduler that cannot be reached, a worker that does not see the place.
         SimulationError: the workers are gone.
     """
     with _connected(scheduler) as client:
         if not client.nthreads():
             raise ValueError(f"scheduler = {scheduler.address!r}: must have a worker")
+        check_seen(client, job.place)
         yield from _on(client, job, todo)
 
 

@@ -120,7 +120,7 @@ def _part(part: str | None) -> Part:
 
 def _made(there: Store, job: Job, part: Part, make: Callable[..., Generator[Made, None, None]], tell: Tell) -> Outcome:
     def count(chunks: Iterable[int]) -> int:
-        return sum(len(job.numbers(chunk)) for chunk in chunks)
+        return sum(map(job.count, chunks))
 
     mine = range(part.k - 1, job.chunks, part.n)
     runs, had = count(mine), count(there.done)

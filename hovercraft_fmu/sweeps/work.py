@@ -51,8 +51,13 @@ class Job:
 
     def numbers(self, chunk: int) -> NDArray[np.int64]:
         """Of the runs of a chunk."""
+        first = chunk * int(self.about["chunk"])
+        return np.arange(first, first + self.count(chunk))
+
+    def count(self, chunk: int) -> int:
+        """How many runs it has."""
         size = int(self.about["chunk"])
-        return np.arange(chunk * size, min((chunk + 1) * size, self.sampling.runs))
+        return min(size, self.sampling.runs - chunk * size)
 
 
 class Made(NamedTuple):
