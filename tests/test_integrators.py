@@ -261,7 +261,9 @@ def test_right_after_a_refused_step_adaptive_does_not_take_a_longer_one(monkeypa
     monkeypatch.setattr(integrators, "_dormand_prince", seen)
     for course in np.linspace(0.0, 6.0, 20):  # where the drag point comes through rest
         start = State(vx=math.cos(course), vy=math.sin(course), yaw_rate=0.2)
-        advance(start, Controls(0.0), Craft(), 20.0, Settings(5.0, method("adaptive")))
+        begun = len(tried)
+        made = advance(start, Controls(0.0), Craft(), 20.0, Settings(5.0, method("adaptive")))
+        assert made.substeps == len(tried) - begun  # what is refused costs as much, and is counted
     after = [(b[0], c[0]) for a, b, c in zip(tried, tried[1:], tried[2:], strict=False) if not a[1] and b[1] and c[1]]
     assert len(after) > 20
     assert all(longer <= h for h, longer in after)

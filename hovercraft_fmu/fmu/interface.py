@@ -96,7 +96,7 @@ VARIABLES: tuple[Variable, ...] = (
     Variable(19, "applied.steering", "local", "continuous", "N", None,
              "Side force of both bow thrusters after saturation, to starboard"),
     Variable(20, "substeps", "local", "discrete", None, None,
-             f"Sub-steps since initialization; stops at {SUBSTEPS_MAX}",
+             f"Sub-steps since initialization, of adaptive those refused, too; stops at {SUBSTEPS_MAX}",
              kind="Integer", minimum=0, maximum=SUBSTEPS_MAX),
     # -- parameters
     Variable(21, "mass", "parameter", "fixed", "kg", _CRAFT.mass, "Mass, greater than 0"),

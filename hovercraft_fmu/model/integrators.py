@@ -38,6 +38,7 @@ class Stretch(NamedTuple):
 
     state: State
     substeps: int
+    """Of the adaptive method those that it tried and refused, too: they cost the same."""
     stability: float
     """1: the largest stability number of a sub-step, wherever the loads were worked out and at the end: h times the
     fastest linearized drag rate.
@@ -437,8 +438,8 @@ def adaptive(
     y = tuple(state)
     drag_rate, spin_rate = craft.drag_rate, craft.spin_rate
     first, kq = rates_at(y)
-    time, count, most, fastest = 0.0, 0, 0.0, 0.0
-    tried, growth = 0, MAX_GROWTH
+    time, tried, most, fastest = 0.0, 0, 0.0, 0.0
+    growth = MAX_GROWTH
     while time < duration:
         h = min(duration - time, proposed)
         slides, longest = reach(y, first)
@@ -469,12 +470,12 @@ def adaptive(
             continue
         most, fastest = max(most, h * (kq * drag_rate + abs(y[5]) * spin_rate)), max(fastest, h * abs(y[5]))
         time = duration if last else time + h
-        y, (first, kq), count = new, rates, count + 1
+        y, (first, kq) = new, rates
         most, fastest = max(most, h * (kq * drag_rate + abs(y[5]) * spin_rate)), max(fastest, h * abs(y[5]))
         if not last:  # a step cut short by the end says nothing against the one proposed
             proposed = h * min(growth, 0.9 * math.sqrt(math.sqrt(tolerance / error)) if error else growth)
         growth = MAX_GROWTH
-    return Stretch(State(*y), count, most, fastest, proposed)
+    return Stretch(State(*y), tried, most, fastest, proposed)
 
 
 Vector: TypeAlias = tuple[float, ...]
@@ -558,7 +559,7 @@ class Integrator(NamedTuple):
     integrate: Integrate | None
     """None for the adaptive method, which cuts the time itself."""
     stages: int
-    """How many times a sub-step works out the loads; of adaptive, one that is taken."""
+    """How many times a sub-step works out the loads; of adaptive one that is refused, too."""
     order: int
     """Of the error, as a power of the sub-step."""
     rubbing_order: int

@@ -945,7 +945,7 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
     double y[COMPONENTS];
     double time = 0.0, most = 0.0, fastest = 0.0;
     double growth = MAX_GROWTH;
-    int64_t count = 0, tried = 0;
+    int64_t tried = 0;
     struct rates stages[STAGES];
     components_of(state, y);
     stages[0] = rates_at(&f, y);
@@ -986,7 +986,6 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
         for (int i = 0; i < COMPONENTS; i++)
             y[i] = new[i];
         stages[0] = stages[STAGES - 1];
-        count++;
         most = larger(most, h * fastest_rate(&f, stages[0].kq, y[YAW_RATE]));
         fastest = larger(fastest, h * fabs(y[YAW_RATE]));
         if (!last) /* a step cut short by the end, or a bend, says nothing against the one proposed */
@@ -995,7 +994,7 @@ static enum outcome adaptive(const struct state *state, const struct drive *driv
     }
     *stretch = (struct stretch){
         .state = state_of(y),
-        .substeps = count,
+        .substeps = tried,
         .stability = most,
         .rotation = fastest,
         .proposed = proposed,

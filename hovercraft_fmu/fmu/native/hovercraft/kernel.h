@@ -99,7 +99,7 @@ struct error {
 
 struct stretch {
     struct state state;
-    int64_t substeps;
+    int64_t substeps; /* of the adaptive method those that it tried and refused, too */
     double stability; /* 1: the largest of a sub-step, wherever the loads were worked out and at the end */
     double rotation; /* rad: the largest |yaw rate|*h, there too */
     double proposed; /* s: the step that the adaptive method would take next */
