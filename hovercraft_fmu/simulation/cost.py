@@ -14,7 +14,7 @@ OPERATIONS = {"splitting": (1, 2)}
 def counted(method: Integrator, substeps: float) -> float:
     """What sub-steps cost, in evaluations of the loads: each has a sine with its cosine, a square root, and the rest.
 
-    Of the adaptive method those of the steps it refused, too. Terms of a scene count nothing: they cost all methods alike.
+    Of adaptive those of the steps it refused, too. Terms of a scene count nothing: they cost all methods alike.
     """
     sines, roots = OPERATIONS.get(method.name, (method.stages, method.stages))
     return substeps * (sines * SINE + roots * ROOT + method.stages * REST)
