@@ -1,5 +1,6 @@
 """Chunks are made on a cluster of dask's."""
 
+import logging
 import ssl
 from collections.abc import Generator
 from itertools import islice
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 import distributed
 from distributed.comm.addressing import get_address_host_port
 from distributed.security import Security
+from distributed.utils import silence_logging_cmgr
 
 from ..host import SimulationError
 from .seen import check_seen
@@ -16,7 +18,7 @@ from .work import Job, Made, make_chunk, release
 from .workers import Todo
 
 CONNECT = 10
-"""s, to reach a scheduler."""
+"""s, to reach a scheduler, and for its first worker to be there."""
 AHEAD = 2
 """Chunks a worker that are on their way: memory here and there stays bounded."""
 
@@ -39,11 +41,13 @@ def made_on(scheduler: Scheduler, job: Job, todo: Todo) -> Generator[Made, None,
     Raises:
         ValueError: what is no address; files for TLS that do not fit; a scheduler without a worker.
         OSError: a scheduler that cannot be reached, a worker that does not see the place.
-        SimulationError: the workers are gone.
+        SimulationError: the workers are gone, or the scheduler is.
     """
-    with _connected(scheduler) as client:
-        if not client.nthreads():
-            raise ValueError(f"scheduler = {scheduler.address!r}: must have a worker")
+    with silence_logging_cmgr(logging.CRITICAL), _connected(scheduler) as client:
+        try:
+            client.wait_for_workers(1, timeout=CONNECT)
+        except distributed.TimeoutError as error:
+            raise ValueError(f"scheduler = {scheduler.address!r}: must have a worker") from error
         check_seen(client, job.place)
         yield from _on(client, job, todo)
 
@@ -83,21 +87,34 @@ def _security(scheduler: Scheduler) -> Security | None:
 
 
 def _on(client: Any, job: Job, todo: Todo) -> Generator[Made, None, None]:
-    everywhere = client.scatter(job, broadcast=True)
+    # as a task, not scattered: a worker passes it on, and where all that have it are killed it is sent again
+    everywhere = client.submit(_sent, job, pure=False)
     chunks = iter(todo)
 
     def submitted(count: int) -> list[Any]:
-        return [client.submit(make_chunk, everywhere, chunk, pure=False) for chunk in islice(chunks, count)]
+        made: list[Any] = client.map(_made, list(islice(chunks, count)), job=everywhere, pure=False)
+        return made
 
     waiting = distributed.as_completed(submitted(AHEAD * sum(client.nthreads().values())), loop=client.loop)
     try:
-        for future in waiting:
-            yield future.result()
-            future.release()
-            for new in submitted(1):
-                waiting.add(new)
-    except (distributed.KilledWorker, distributed.client.FutureCancelledError) as error:
+        for finished in waiting.batches():  # the more there are, the less each of them takes
+            waiting.update(submitted(len(finished)))
+            yield from client.gather(finished)
+    except distributed.KilledWorker as error:
         raise SimulationError(f"the workers are gone: {error}") from error
+    except distributed.client.FutureCancelledError as error:
+        raise SimulationError(
+            "the scheduler is gone, or was restarted: what was made is there; the same command goes on"
+        ) from error
     finally:
-        client.cancel(list(waiting.futures))
-        client.run(release, job.sweep)
+        if client.status == "running":
+            client.cancel(list(waiting.futures))
+            client.run(release, job.sweep, on_error="ignore")
+
+
+def _sent(job: Job) -> Job:
+    return job
+
+
+def _made(chunk: int, job: Job) -> Made:
+    return make_chunk(job, chunk)

@@ -1,14 +1,16 @@
 """Where files are: in a folder, or at an address that fsspec knows, as s3://bucket/folder; each whole, or not there."""
 
+import errno
 import os
 import platform
 import re
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
 from ..whole import written
@@ -16,7 +18,14 @@ from ..whole import written
 PUT_WHOLE = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oci", "oss", "memory"}
 """Stores in which a file is there when all of it has come; elsewhere it is written aside and takes its name then."""
 ADDRESS = re.compile(r"([A-Za-z0-9+.-]{2,}(::[A-Za-z0-9+.-]+)*)://.*", re.DOTALL)
+PAUSES = tuple(0.1 * 2**i for i in range(7))
+"""s, before what failed is tried again: a store that fails once in ten times ends no sweep of a million files."""
+LASTING = (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError, PermissionError,
+           ImportError, LookupError, TypeError, ValueError)  # fmt: skip
+LASTING_NUMBERS = {errno.EDQUOT, errno.EFBIG, errno.EINVAL, errno.ENAMETOOLONG, errno.ENOSPC, errno.EROFS}
 RULE = "must be a place that can be read and written"
+
+Returned = TypeVar("Returned")
 
 
 @dataclass(frozen=True)
@@ -44,83 +53,107 @@ class Place:
         """fsspec's file system, and the path there."""
         return _store(self.address)
 
+    @property
+    def _put_whole(self) -> bool:
+        return bool(set(_protocols(self.store[0])) & PUT_WHOLE)
+
     def path(self, name: str) -> str:
         """Of a file, as its file system knows it."""
         return f"{self.store[1].rstrip('/')}/{name}"
 
     def names(self, within: str) -> list[str]:
         """The names of the files there, in any order; none where nothing is."""
-        with self._told():
-            try:
-                if self.folder:
-                    return os.listdir(self.folder / within)
-                store = self.store[0]
-                store.invalidate_cache()  # another one may have written since
-                paths: list[str] = store.ls(self.path(within), detail=False)
-                return [path.rpartition("/")[2] for path in paths]
-            except FileNotFoundError:
-                return []
+
+        def listed() -> list[str]:
+            if self.folder:
+                return os.listdir(self.folder / within)
+            store = self.store[0]
+            store.invalidate_cache()  # another one may have written since
+            paths: list[str] = store.ls(self.path(within), detail=False)
+            return [path.rpartition("/")[2] for path in paths]
+
+        try:
+            return self._tried(listed, FileNotFoundError)
+        except FileNotFoundError:
+            return []
 
     def read(self, name: str) -> bytes:
         """Raises FileNotFoundError where it is not there."""
-        with self._told():
-            content: bytes = self.store[0].cat_file(self.path(name))
-            return content
+        return bytes(self._tried(lambda: self.store[0].cat_file(self.path(name)), FileNotFoundError))
 
     def write(self, name: str, content: bytes) -> None:
         """What was there is replaced; what is written is on the disk afterwards."""
-        with self._told():
-            if self.folder:
-                with written(self.folder / name) as aside, aside.open("wb") as file:
-                    file.write(content)
-                    file.flush()
-                    os.fsync(file.fileno())
-                return
-            store, path = self.store[0], self.path(name)
-            if set(_protocols(store)) & PUT_WHOLE:
-                store.pipe_file(path, content)
-                return
-            within, _, last = path.rpartition("/")
-            begun = f"{within}/.{last}.{platform.node()}.{os.getpid()}"
-            store.makedirs(within, exist_ok=True)
-            store.pipe_file(begun, content)
-            store.mv(begun, path)
+        self._tried(partial(self._write_file if self.folder else self._write_there, name, content))
+
+    def _write_file(self, name: str, content: bytes) -> None:
+        with written(Path(self.address, name)) as path, path.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+
+    def _write_there(self, name: str, content: bytes) -> None:
+        store, path = self.store[0], self.path(name)
+        if self._put_whole:
+            store.pipe_file(path, content)
+            return
+        within, _, last = path.rpartition("/")
+        aside = f"{within}/.{last}.{platform.node()}.{os.getpid()}"
+        store.makedirs(within, exist_ok=True)
+        store.pipe_file(aside, content)
+        store.mv(aside, path)
 
     def create(self, name: str, content: bytes) -> None:
         """As `write`. Raises FileExistsError where it is there; two who do it at once are told apart by most stores."""
-        with self._told():
+
+        def created() -> None:
             store, path = self.store
-            store.makedirs(path, exist_ok=True)
+            if not self._put_whole:  # where it is, that would make a bucket
+                store.makedirs(path, exist_ok=True)
             store.pipe_file(self.path(name), content, mode="create")
+
+        self._tried(created, FileExistsError)
 
     def remove(self, names: Iterable[str]) -> None:
         """Those that are there."""
-        with self._told():
-            for name in names:
-                with suppress(FileNotFoundError):
-                    self.store[0].rm_file(self.path(name))
+        for name in names:
+            with suppress(FileNotFoundError):
+                self._tried(partial(self.store[0].rm_file, self.path(name)), FileNotFoundError)
 
     def rename(self, name: str, new: str) -> None:
         """Nothing where it is not there."""
-        with self._told(), suppress(FileNotFoundError):
-            self.store[0].mv(self.path(name), self.path(new))
+        with suppress(FileNotFoundError):
+            self._tried(partial(self.store[0].mv, self.path(name), self.path(new)), FileNotFoundError)
 
     def clear_up(self, process: int) -> None:
         """Delete what a process of this machine, which was ended, has begun to write to a folder."""
         for left in self.folder.glob(f"*/.*.{platform.node()}.{process}") if self.folder else ():
             left.unlink(missing_ok=True)
 
-    @contextmanager
-    def _told(self) -> Iterator[None]:
-        """What a library of a store raises, as OSError; no file, and a file already, as they are."""
-        try:
-            yield
-        except (FileNotFoundError, FileExistsError):
-            raise
-        except Exception as error:
-            if self.folder and isinstance(error, OSError):
-                raise
-            raise OSError(f"output = {self.given!r}: {RULE}; {_said(error)}") from error
+    def _tried(self, operation: Callable[[], Returned], expected: type[OSError] | None = None) -> Returned:
+        """What it returns, at last; what may pass is tried again.
+
+        Raises what a library of a store raises as OSError, what is expected as it is.
+        """
+        for pause in (*PAUSES, 0.0):
+            try:
+                return operation()
+            except Exception as error:
+                failed = error
+            if _lasts(failed):
+                break
+            time.sleep(pause)
+        if (expected and isinstance(failed, expected)) or (self.folder and isinstance(failed, OSError)):
+            raise failed
+        raise OSError(f"output = {self.given!r}: {RULE}; {_said(failed)}") from failed
+
+
+def _lasts(error: Exception) -> bool:
+    """Whether it will be the same a moment later."""
+    return (
+        isinstance(error, LASTING)
+        or (isinstance(error, OSError) and error.errno in LASTING_NUMBERS)
+        or "Credential" in type(error).__name__  # as those of s3:// and gs:// have it, which are no OSError
+    )
 
 
 def _said(error: Exception) -> str:
