@@ -956,7 +956,7 @@ def test_a_cluster_lets_in_who_has_the_key(
     )
     monkeypatch.setattr(cluster, "CONNECT", 1.0)
     here = {"n_workers": 1, "threads_per_worker": 1, "host": "127.0.0.1", "processes": False}
-    with distributed.LocalCluster(**here, security=security, protocol="tls://", dashboard_address=None) as there:
+    with distributed.LocalCluster(**here, security=security, protocol="tls://", dashboard_address="127.0.0.1:0") as there:
         address = there.scheduler_address
         outcome = sweep(MASSES, engine="batch", scheduler=address, tls=ours, output=tmp_path / "ours")
         assert outcome.new == 6
