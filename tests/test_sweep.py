@@ -955,8 +955,8 @@ def test_a_cluster_lets_in_who_has_the_key(
         tls_ca_file=str(ours[0]), require_encryption=True, **dict(zip(names, map(str, ours[1:] * 3), strict=True))
     )
     monkeypatch.setattr(cluster, "CONNECT", 1.0)
-    here = {"n_workers": 1, "threads_per_worker": 1, "host": "127.0.0.1", "processes": False}
-    with distributed.LocalCluster(**here, security=security, protocol="tls://", dashboard_address="127.0.0.1:0") as there:
+    here = {"n_workers": 1, "threads_per_worker": 1, "host": "127.0.0.1", "processes": False, "dashboard_address": ":0"}
+    with distributed.LocalCluster(**here, security=security, protocol="tls://") as there:
         address = there.scheduler_address
         outcome = sweep(MASSES, engine="batch", scheduler=address, tls=ours, output=tmp_path / "ours")
         assert outcome.new == 6
