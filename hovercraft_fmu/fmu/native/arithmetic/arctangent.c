@@ -45,12 +45,10 @@ static const double ATAN_EVEN[] = {
 };
 static const double PI_HIGH = 3.1415926535897931160E+00, PI_LOW = 1.2246467991473531772E-16;
 
-/* Of a number that is not negative. */
+/* Of a number from 0 to 2^64. */
 static double arctangent_of(double x)
 {
     int part = -1;
-    if (x >= 0x1p66)
-        return ATAN_HIGH[3] + ATAN_LOW[3];
     if (x < 0.4375) {
         if (x < 0x1p-27)
             return x;

@@ -105,8 +105,8 @@ static double distilled(const double *q, int32_t *iq, int jz)
     return z;
 }
 
-/* 1 - q, where q is the fraction in iq[0..jz-1]; whether there was anything to subtract. */
-static int complemented(int32_t *iq, int jz, int q0)
+/* 1 - q, where q is the fraction in iq[0..jz-1]: never 0, as no double is that close to a multiple of pi/4. */
+static void complement(int32_t *iq, int jz, int q0)
 {
     int carry = 0;
     for (int i = 0; i < jz; i++) {
@@ -122,7 +122,6 @@ static int complemented(int32_t *iq, int jz, int q0)
         iq[jz - 1] &= 0x7fffff;
     else if (q0 == 2)
         iq[jz - 1] &= 0x3fffff;
-    return carry;
 }
 
 /* The sum of iq[0..jz] * 2^(q0 - 24*(jz - i)) times pi/2, as y[0] + y[1]; negative where `negative`. */
@@ -179,12 +178,9 @@ static int reduce_parts(const double *x, double y[2], int e0, int nx)
         }
         if (half > 0) { /* more than one half: take the rest to the next multiple */
             n += 1;
-            const int carry = complemented(iq, jz, q0);
-            if (half == 2) {
-                z = 1.0 - z;
-                if (carry)
-                    z -= times_power_of_two(1.0, q0);
-            }
+            complement(iq, jz, q0);
+            if (half == 2)
+                z = (1.0 - z) - times_power_of_two(1.0, q0);
         }
         if (z != 0.0)
             break;

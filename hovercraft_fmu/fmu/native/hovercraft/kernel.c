@@ -1031,8 +1031,7 @@ static bool substeps(double communication_step, double step_size, int64_t *n, do
     if (fabs(whole * step_size - communication_step) <= rounding) {
         *h = step_size;
     } else {
-        const double down = (double)(int64_t)ratio;
-        whole = larger(1.0, down < ratio ? down + 1.0 : down);
+        whole = (double)(int64_t)ratio + 1.0; /* of a whole ratio the product is the step, but for rounding */
         *h = communication_step / whole;
     }
     *n = (int64_t)whole;

@@ -303,10 +303,8 @@ static void add_value(struct text *text, char kind, va_list *values)
     case 'i':
         add_integer(text, va_arg(*values, long long));
         break;
-    case 'u':
+    default: /* 'u' */
         add_natural(text, va_arg(*values, unsigned long long), 1);
-        break;
-    default:
         break;
     }
 }
