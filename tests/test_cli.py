@@ -273,6 +273,7 @@ def test_list_scenes(shell: Shell) -> None:
         (("simulate", "--set", "mas=4"), "mas = 4: must be a variable that can be set.*; did you mean 'mass'?"),
         (("simulate", "--input", "nix.csv"), "nix.csv: No such file or directory"),
         (("simulate", "nix.fmu"), "nix.fmu: no such FMU"),
+        (("simulate", "nowhere/nix.fmu"), "nix.fmu: no such FMU"),
         (("simulate", "--plot", "a.txt"), "plot = 'a.txt': must end in .png, .svg or .pdf"),
         (("sweep", "turning_circle", "--plot", "a.txt"), "plot = 'a.txt': must end in .png"),
         (("sweep", "turning_circl"), "did you mean 'turning_circle'?"),

@@ -12,8 +12,9 @@ from hovercraft_fmu import cli, libraries
 from hovercraft_fmu.building import PRODUCTS, build
 from hovercraft_fmu.fmu import machine_code
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3
-from hovercraft_fmu.fmu.machine_code import PLATFORMS, NotCompiledError, library
+from hovercraft_fmu.fmu.machine_code import PLATFORMS, Library, NotCompiledError, c_file, compile_all, library
 from hovercraft_fmu.libraries import compile_libraries
+from tests.binaries import dylib
 
 
 @pytest.fixture
@@ -59,6 +60,33 @@ def test_changed_c_is_never_run_as_old_machine_code(tmp_path: Path, monkeypatch:
     assert last.exists()  # the last good state: taking the change back is enough
 
 
+TINY = """
+#ifdef _WIN32
+#include <windows.h>
+BOOL WINAPI DllMain(HINSTANCE instance, DWORD why, LPVOID unused) { return instance && !why && !unused; }
+#endif
+static int count;
+__attribute__((visibility("default"))) int tiny(int more) { return count += more; }
+"""
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+def test_each_system_gets_what_it_asks_of_a_library() -> None:
+    """Windows its headers, though there is no C library; macOS the library's own name."""
+    platforms = ("x86_64-windows", "aarch64-darwin")
+    tiny = Library("Tiny", ("tiny.c",), {"tiny.c": TINY.encode()}, platforms)
+    if (reason := compile_all([tiny])).startswith("the compiler"):
+        pytest.skip(reason)
+    assert reason == tiny.missing == ""
+    assert tiny.path("x86_64-windows").read_bytes()[:2] == b"MZ"
+    assert dylib(tiny.path("aarch64-darwin").read_bytes()).name == "@rpath/Tiny.dylib"
+
+
+def test_a_file_of_c_that_is_not_there() -> None:
+    with pytest.raises(FileNotFoundError, match=r"native: no nix\.c in it"):
+        c_file("nix.c")
+
+
 def test_both_flavours_share_a_unit_that_is_compiled_once() -> None:
     """The compiler's cache goes by the content of all that it reads."""
     units = {name: library(flavour).files for name, flavour in (("2", NATIVE), ("3", NATIVE3))}
@@ -83,21 +111,27 @@ def test_the_command_ends_well_where_it_compiled(
 
 
 @pytest.mark.parametrize(
-    ("variable", "version", "says"),
+    ("variable", "compiler", "says"),
     [
         (
-            *("1", machine_code.COMPILER[1]),
+            *("1", machine_code.COMPILER),
             "HOVERCRAFT_FMU_NO_COMPILER was set when the package was installed; install it again without that variable",
         ),
-        ("", "0.0.1", "must be 0.0.1, which makes the bytes; compile it: pip install -e ."),
+        ("", ("ziglang", "0.0.1"), "must be 0.0.1, which makes the bytes; compile it: pip install -e ."),
+        ("", ("zigzag", "1.0"), "the compiler, zigzag 1.0, was not installed; compile it: pip install -e ."),
     ],
 )
 def test_a_compiler_that_is_left_out_or_another(
-    variable: str, version: str, says: str, nothing_compiled: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    variable: str,
+    compiler: tuple[str, str],
+    says: str,
+    nothing_compiled: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     """The Python FMU is written all the same, and what is missing is said in one line."""
     monkeypatch.setenv(machine_code.LEAVE_OUT, variable)
-    monkeypatch.setattr(machine_code, "COMPILER", ("ziglang", version))
+    monkeypatch.setattr(machine_code, "COMPILER", compiler)
     stale = nothing_compiled / "HovercraftNative-0" / "x86_64-linux" / "HovercraftNative.so"
     stale.parent.mkdir(parents=True)
     stale.write_bytes(b"of other C")

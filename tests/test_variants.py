@@ -21,6 +21,7 @@ from hovercraft_fmu.cli import commands
 from hovercraft_fmu.fmu.block import HEAD, MARK, Block, block, checksum, patched
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from hovercraft_fmu.fmu.interface import HOVERCRAFT, OUTPUTS
+from hovercraft_fmu.fmu.mach_o import signed
 from hovercraft_fmu.fmu.machine_code import C_FOLDER, PLATFORMS, block_of, identity, library
 from hovercraft_fmu.fmu.native_package import build_native_fmu
 from hovercraft_fmu.fmu.python_package import build_fmu
@@ -430,6 +431,16 @@ def test_a_name_that_a_library_of_macos_has_no_room_for(standard: int) -> None:
     own = block_of(flavour.variant("A", {}), "a" * 32)
     with pytest.raises(ValueError, match=r"^A+\.dylib: must be a shorter name"):
         patched(library(flavour).path("aarch64-darwin").read_bytes(), own, f"{'A' * 5000}.dylib")
+
+
+@pytest.mark.usefixtures("complete_native_fmu")
+def test_a_signature_of_another_kind_is_not_made_anew(standard: int) -> None:
+    """Of the code directory, the byte at its place 37: 2 is SHA-256."""
+    content = library(NATIVE if standard == 2 else NATIVE3).path("aarch64-darwin").read_bytes()
+    directory = content.index(b"\xfa\xde\x0c\x02")
+    other = content[: directory + 37] + b"\x03" + content[directory + 38 :]
+    with pytest.raises(ValueError, match="hashes of type 3: must be SHA-256, 2"):
+        signed(other)
 
 
 # ---- making one
