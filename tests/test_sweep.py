@@ -650,6 +650,13 @@ def test_a_sweep_at_an_address_is_that_of_a_folder(
     assert (outcome.new, len(outcome.spoiled)) == (3, 1)
     assert names_at(f"{memory}/runs") == [".00001.parquet.spoiled", "00000.parquet", "00001.parquet"]
     assert load(memory).to_table().equals(load(tmp_path).to_table())
+    # a store looks after its bytes: of a file that is there its end is read, and all of it by `load`
+    content = bytearray(filesystem("memory").cat(file))
+    content[100] ^= 1
+    filesystem("memory").pipe(file, bytes(content))
+    assert sweep(KEPT, engine="batch", workers=1, output=memory).new == 0
+    with pytest.raises(ValueError, match=r"runs/00001\.parquet: is damaged: .*: remove it; the same command makes it"):
+        load(memory).to_table()
     with pytest.raises(ValueError, match=rf"{memory}: holds the results of another sweep \(study differ\)"):
         sweep(MASSES, engine="batch", workers=1, output=memory)
     assert sweep(MASSES, engine="batch", workers=1, output=memory, overwrite=True).new == 6

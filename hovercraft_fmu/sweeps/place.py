@@ -77,9 +77,10 @@ class Place:
         except FileNotFoundError:
             return []
 
-    def read(self, name: str) -> bytes:
-        """Raises FileNotFoundError where it is not there."""
-        return bytes(self._tried(lambda: self.store[0].cat_file(self.path(name)), FileNotFoundError))
+    def read(self, name: str, last: int | None = None) -> bytes:
+        """A file, or so many bytes at its end. Raises FileNotFoundError where it is not there."""
+        start = -last if last else None
+        return bytes(self._tried(lambda: self.store[0].cat_file(self.path(name), start=start), FileNotFoundError))
 
     def write(self, name: str, content: bytes) -> None:
         """What was there is replaced; what is written is on the disk afterwards."""

@@ -103,7 +103,7 @@ def _checked(place: Place, name: str, about: Mapping[str, Any]) -> tuple[dict[st
             why = str(error)
         if not why:
             return there, content
-        raise ValueError(f"{place}/{name}: {why}; the same command makes it anew")
+        raise ValueError(f"{place}/{name}: {why}: remove it; the same command makes it anew")
     raise ValueError(f"{place}/{name}: is missing; the same command makes it anew")
 
 
