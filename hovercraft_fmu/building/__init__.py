@@ -5,7 +5,8 @@ import platform
 import sys
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, NamedTuple, TypeAlias, get_args
@@ -250,6 +251,18 @@ def default_fmu(kind: Kind | None = None) -> Path:
             f"{path}: {found}; 'hovercraft-fmu build {kind}' writes it again (or name it, to run it as it is)"
         )
     return path
+
+
+@contextmanager
+def fmu_to_try(kind: Kind | None = None) -> Iterator[Path]:
+    """The same file; where it is not there one that is gone with the context, so that nothing is left in build/."""
+    kind = kind or default_kind()
+    name = product(kind).name
+    if (FOLDER / name).exists():
+        yield default_fmu(kind)
+        return
+    with temporary_folder() as folder:
+        yield build(kind, Path(folder) / name)
 
 
 def built_fmus() -> list[Path]:

@@ -1,11 +1,14 @@
 """The commands that make many runs: measure, sweep."""
 
 from collections.abc import Iterable
+from contextlib import ExitStack
+from datetime import timedelta
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.filesize import decimal
 from rich.progress import MofNCompleteColumn, ProgressColumn, Task
 from rich.text import Text
 
@@ -17,6 +20,7 @@ from .output import OUTPUT, json_option, print_json, print_table, progress_of
 if TYPE_CHECKING:
     from ..building import Kind
     from ..sweeps.reading import Extreme
+    from ..sweeps.study import Study
 
 
 class _Measure(click.Command):
@@ -71,6 +75,7 @@ def _studies() -> Iterable[str]:
     help="A folder, or s3://bucket/folder and the like. Default: build/sweep/ and the study.",
 )  # fmt: skip
 @click.option("--part", metavar="K/N", help="Make the K-th of N parts alone, as 2/8; together they are the sweep.")
+@click.option("--dry-run", is_flag=True, help="Say what it would come to: runs, chunks, bytes, time. Nothing is made.")
 @click.option("--overwrite", is_flag=True, help="Delete the results that are there, of this or another sweep, before.")
 @click.option("--plot", type=PathOf(path_type=Path), metavar="FILE.png|.svg|.pdf", help="Draw the results.")
 @json_option
@@ -84,6 +89,7 @@ def sweep(
     tls_ca: Path | None,
     tls_cert: Path | None,
     tls_key: Path | None,
+    dry_run: bool,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -97,6 +103,9 @@ def sweep(
     from ..sweeps.reading import overview
 
     chosen = read_study(study)
+    if dry_run:
+        _tell_estimate(chosen, fmu, kind, as_json, engine=engine, output=output, **options)
+        return
     if plot:
         from ..drawing.figures import check_plot
 
@@ -132,6 +141,31 @@ def sweep(
         from ..sweeps.charts import plot_sweep
 
         OUTPUT.print(f"wrote {plot_sweep(outcome.folder, plot)}")
+
+
+def _tell_estimate(study: "Study", fmu: Path | None, kind: "Kind | None", as_json: bool, **options: Any) -> None:
+    from ..building import fmu_to_try
+    from ..sweeps import estimate
+
+    if options.pop("scheduler"):
+        raise click.UsageError("--scheduler: must not be given with --dry-run, which asks none: give --workers")
+    del options["overwrite"]  # it is as if there were nothing
+    with ExitStack() as stack:
+        if kind and not fmu:
+            fmu = stack.enter_context(fmu_to_try(kind))
+        found = estimate(study, fmu, **options)
+    OUTPUT.print(f"{study.name}: {found.runs} runs in {found.chunks} chunks, {decimal(found.bytes)}")
+    some = f", {_duration(found.seconds)} by {found.workers}" if found.workers > 1 else ""
+    OUTPUT.print(
+        f"{_duration(found.seconds_of_one)} by one worker{some}, each as fast as this machine now "
+        f"(measured on {found.measured} runs; their start is not counted)"
+    )
+    if as_json:
+        print_json(found._asdict())
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.2g} s" if seconds < 60.0 else str(timedelta(seconds=round(seconds)))
 
 
 class _Rate(ProgressColumn):

@@ -4,21 +4,24 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .forecast import Estimate, estimate
     from .reading import load
     from .runner import Outcome, sweep
     from .study import STUDIES, Study, read_study
 
 _HOMES = {
     "STUDIES": "study",
+    "Estimate": "forecast",
     "Outcome": "runner",
     "Study": "study",
+    "estimate": "forecast",
     "load": "reading",
     "read_study": "study",
     "sweep": "runner",
 }
 """Where each name is from: a worker needs less than the one who starts it."""
 
-__all__ = ["STUDIES", "Outcome", "Study", "load", "read_study", "sweep"]
+__all__ = ["STUDIES", "Estimate", "Outcome", "Study", "estimate", "load", "read_study", "sweep"]
 
 
 def __getattr__(name: str) -> Any:

@@ -100,16 +100,17 @@ def sweep(
             the output.
     """
     chosen = study if isinstance(study, Study) else read_study(study)
-    chunks_of = _part(part)
+    chunks_of = part_of(part)
     place = place_of(output or default_folder(chosen.name))
-    job = _job(chosen, fmu, engine, place)
+    job = job_of(chosen, fmu, engine, place)
     if workers is not None and workers < 1:
         raise ValueError(f"workers = {workers}: must be at least 1")
     with store(place, job.about, chunks_of, overwrite) as there:
         return _made(there, job, chunks_of, partial(_chunks, workers=workers, scheduler=scheduler, tls=tls), tell)
 
 
-def _part(part: str | None) -> Part:
+def part_of(part: str | None) -> Part:
+    """What k/n means; None: the whole. Raises ValueError."""
     if part is None:
         return WHOLE
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", part, re.ASCII)
@@ -156,7 +157,7 @@ def _chunks(
     if scheduler is None:
         if any(tls):
             raise ValueError("tls_ca, tls_cert, tls_key: must be given with a scheduler: workers here need no port")
-        count = workers or _processors()
+        count = workers or processors()
         return made_here(job, todo) if count == 1 else made_beside(job, todo, count)
     if workers is not None:
         raise ValueError(f"workers = {workers}: must not be given with a scheduler, which has its own")
@@ -165,12 +166,12 @@ def _chunks(
     return made_on(Scheduler(scheduler, *tls), job, todo)
 
 
-def _processors() -> int:
+def processors() -> int:
     """That this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _job(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place: Place) -> Job:
+def job_of(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place: Place) -> Job:
     """What goes to the workers."""
     if engine not in ENGINES:
         raise ValueError(must_be_one_of("engine", engine, ENGINES))

@@ -89,8 +89,8 @@ def make_chunk(job: Job, chunk: int) -> Made:
     _check_sees(job)
     numbers = job.numbers(chunk)
     samples = job.sampling.samples(numbers)
-    ran = run_batch(job.plan, samples) if job.fmu is None else _driver(job).run(samples)
-    for what, table in _tables(job, numbers, samples, ran):
+    ran = run(job, samples)
+    for what, table in tables(job, numbers, samples, ran):
         job.place.write(chunk_file(what, chunk), packed(table, job.about, what, chunk))
     errors = [(int(number), error) for number, error in zip(numbers, ran.errors, strict=True) if error is not None]
     warned = int(np.count_nonzero(ran.warnings))
@@ -106,7 +106,13 @@ def _check_sees(job: Job) -> None:
         )
 
 
-def _tables(job: Job, numbers: NDArray[np.int64], samples: Samples, ran: Ran) -> Iterator[tuple[str, pa.Table]]:
+def run(job: Job, samples: Samples) -> Ran:
+    """Make the runs with these parameters."""
+    return run_batch(job.plan, samples) if job.fmu is None else _driver(job).run(samples)
+
+
+def tables(job: Job, numbers: NDArray[np.int64], samples: Samples, ran: Ran) -> Iterator[tuple[str, pa.Table]]:
+    """What is kept of runs, file by file."""
     keep, timeline = job.plan.keep, job.plan.timeline
     if keep.trajectory:
         good = np.array([error is None for error in ran.errors])
