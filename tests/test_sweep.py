@@ -801,7 +801,7 @@ def chunk_of(study: dict[str, Any], fmu: Path | None = None, runs: int = 10**9, 
     """Runs in a chunk of a study with so many."""
     latin = {"method": "latin_hypercube", "runs": runs, "seed": 1}
     chosen = read_study(but(study, sweep={"mass": RANGE, **swept}, sampling=latin))
-    job = runner_module._job(chosen, fmu, "fmu" if fmu else "batch", place_of("nowhere"))
+    job = runner_module.job_of(chosen, fmu, "fmu" if fmu else "batch", place_of("nowhere"))
     return int(job.about["chunk"])
 
 
@@ -885,7 +885,7 @@ def test_a_place_that_a_worker_does_not_see_is_refused(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"1 of 1 do not: tls://10\.0\.0\.2:4000 \(what it writes is not here\)"):
         check_seen(Elsewhere(), place_of(tmp_path / "here"))
     assert names_at(str(tmp_path / "here")) == []
-    job = runner_module._job(read_study(MASSES), None, "batch", place_of(tmp_path / "there"))
+    job = runner_module.job_of(read_study(MASSES), None, "batch", place_of(tmp_path / "there"))
     with pytest.raises(OSError, match="must be a place that every worker sees"):
         make_chunk(job, 0)
     assert not (tmp_path / "there").exists()

@@ -55,9 +55,14 @@ SECOND = 3.0
 
 def chunk_size(plan: Plan, sampling: Sampling, costs: Costs, least: int) -> int:
     """Runs in a chunk of a study; `least` chunks, or more, so that there is work for some workers."""
-    by_time = SECONDS / fmean(_seconds(plan, settings, costs) for settings in _settings(plan, sampling))
+    by_time = SECONDS / mean_seconds(plan, sampling, costs)
     by_memory = MOST_BYTES / _bytes(plan)
     return max(1, int(min(by_time, by_memory, -(-sampling.runs // least))))
+
+
+def mean_seconds(plan: Plan, sampling: Sampling, costs: Costs) -> float:
+    """Of a run of the study."""
+    return fmean(seconds(plan, settings, costs) for settings in _settings(plan, sampling))
 
 
 def _settings(plan: Plan, sampling: Sampling) -> Iterator[Settings]:
@@ -71,7 +76,7 @@ def _settings(plan: Plan, sampling: Sampling) -> Iterator[Settings]:
         yield settings_of(dict(zip(values, chosen, strict=True)))
 
 
-def _seconds(plan: Plan, settings: Settings, costs: Costs) -> float:
+def seconds(plan: Plan, settings: Settings, costs: Costs) -> float:
     """Of a run."""
     legs = merged(plan.timeline.legs, plan.run.start_time, settings)
     method = settings.integrator

@@ -1,10 +1,10 @@
 """What a sweep would come to, before anything is made: runs, chunks, bytes, time."""
 
 import os
+from collections import Counter
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from statistics import fmean
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from ..building import fmu_to_try
 from ..fmu.near_names import explains_keywords
-from ..simulation.cost import counted
+from .chunks import Costs, mean_seconds, seconds
 from .engines import SETTINGS, settings_of
 from .place import place_of
-from .runner import FMU, default_folder, job_of, part_of, processors
+from .quantities import Samples
+from .runner import FMU, costs_of, default_folder, job_of, part_of, processors
 from .store import packed
 from .study import Study, read_study
 from .work import Job, release, run, tables
@@ -25,8 +26,6 @@ GROWTH = 8
 """So many times more runs are measured at once, until they take so much longer than one alone or are a chunk."""
 LONG_ENOUGH = 0.25
 """s"""
-LOOKED_AT = 4096
-"""Runs whose work is counted, of all of them."""
 
 
 class Estimate(NamedTuple):
@@ -58,8 +57,8 @@ def estimate(
 ) -> Estimate:
     """What `sweep` would come to with the same arguments, as if nothing were there yet. Nothing is written.
 
-    Some runs, drawn at random, are made and packed here. Where sub-step or method is swept, the work of others is
-    known by the evaluations of the loads, which are counted (of the adaptive method it is not).
+    Some runs, drawn at random, are made and packed here. What the others take follows from the work that is counted,
+    of sub-steps and communication steps: sub-step and method may be swept.
 
     Raises as `sweep` does before the first run.
     """
@@ -70,50 +69,70 @@ def estimate(
     with ExitStack() as stack:
         if fmu is None and engine == FMU:
             fmu = stack.enter_context(fmu_to_try())
-        job = job_of(chosen, fmu, engine, place)
-        size, chunks = int(job.about["chunk"]), range(chunks_of.k - 1, job.chunks, chunks_of.n)
-        runs = sum(min(size, chosen.runs - chunk * size) for chunk in chunks)
+        job, costs = job_of(chosen, fmu, engine, place), costs_of(Path(fmu) if fmu else None)
         try:
-            chunk, each, measured = _measured(job, size)
+            chunk, run, measured = _measured(job, costs)
         finally:
             release(job.sweep)
-    seconds, content = (len(chunks) * alone + runs * more for alone, more in zip(chunk, each, strict=True))
+    size, chunks = int(job.about["chunk"]), range(chunks_of.k - 1, job.chunks, chunks_of.n)
+    runs = sum(min(size, chosen.runs - chunk * size) for chunk in chunks)
+    content = len(chunks) * chunk.content + runs * run.content
+    alone = len(chunks) * chunk.seconds + runs * run.seconds
     count = workers or processors()
-    of_all = -(-len(chunks) // count) * seconds / max(1, len(chunks))
-    return Estimate(runs, len(chunks), round(content), count, of_all, seconds, measured)
+    rounds = -(-len(chunks) // count)
+    return Estimate(runs, len(chunks), round(content), count, alone * rounds / max(1, len(chunks)), alone, measured)
 
 
-def _measured(job: Job, size: int) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Of a chunk, whatever its runs, and of each run: the seconds, the bytes; and how many runs tell it."""
-    dice, every = np.random.default_rng(0), job.sampling.runs
-    _made(job, dice.integers(every, size=1))  # it loads what is loaded once
-    numbers = dice.integers(every, size=1)
-    one = many = _made(job, numbers)
-    while len(numbers) < size and many[0] - one[0] < LONG_ENOUGH:
-        numbers = dice.integers(every, size=min(size, GROWTH * len(numbers)))
-        many = _made(job, numbers)
-    count = len(numbers)
-    each = np.clip((many - one) / max(1, count - 1), 0.0, many / count)
-    alone = many - count * each
-    each[0] *= _work(job, dice.integers(every, size=LOOKED_AT)) / _work(job, numbers)
-    return alone, each, count
+class _Taken(NamedTuple):
+    """By some runs."""
+
+    seconds: float
+    content: float
+    """Bytes"""
+    counted: float
+    """s, that they should take; see chunks.py"""
 
 
-def _made(job: Job, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
-    """The seconds and the bytes of a chunk of these runs."""
+def _measured(job: Job, costs: Costs) -> tuple[_Taken, _Taken, int]:
+    """What a chunk takes whatever its runs, and each run of the study; and on how many runs that was measured."""
+    dice, every, size = np.random.default_rng(0), job.sampling.runs, int(job.about["chunk"])
+
+    def taken(count: int) -> _Taken:
+        return _taken(job, costs, dice.integers(every, size=count))
+
+    taken(1)  # it loads what is loaded once
+    one, count = taken(1), 1
+    many = one
+    while count < size and many.seconds - one.seconds < LONG_ENOUGH:
+        count = min(size, GROWTH * count)
+        many = taken(count)
+    factor = _slope(one.counted, one.seconds, many.counted, many.seconds)
+    content = _slope(1, one.content, count, many.content)
+    chunk = _Taken(many.seconds - factor * many.counted, many.content - content * count, 0.0)
+    counted = mean_seconds(job.plan, job.sampling, costs)
+    return chunk, _Taken(factor * counted, content, counted), count
+
+
+def _slope(x: float, y: float, more_x: float, more_y: float) -> float:
+    """So that neither it nor what is left at 0 is negative."""
+    through_zero = more_y / more_x
+    return min(max((more_y - y) / (more_x - x), 0.0), through_zero) if more_x > x else through_zero
+
+
+def _taken(job: Job, costs: Costs, numbers: NDArray[np.int64]) -> _Taken:
     begun = perf_counter()
     samples = job.sampling.samples(numbers)
     ran = run(job, samples)
     content = sum(len(packed(table, job.about, what, 0)) for what, table in tables(job, numbers, samples, ran))
-    return np.array([perf_counter() - begun, content])
+    return _Taken(perf_counter() - begun, content, _counted(job, costs, samples, len(numbers)))
 
 
-def _work(job: Job, numbers: NDArray[np.int64]) -> float:
-    """Evaluations of the loads in a run, the mean of these; 1 where all runs have the same."""
-    samples, common = job.sampling.samples(numbers), job.plan.run
-    if not {"step_size", "integrator"} & samples.keys():
-        return 1.0
-    values = [np.broadcast_to(samples.get(name, common.value(name)), len(numbers)).tolist() for name in SETTINGS]
-    settings = [settings_of(dict(zip(SETTINGS, each, strict=True))) for each in zip(*values, strict=True)]
-    duration = common.stop_time - common.start_time
-    return fmean(counted(each.integrator, duration / each.step_size) for each in settings if each.step_size > 0.0)
+def _counted(job: Job, costs: Costs, samples: Samples, count: int) -> float:
+    values = [np.broadcast_to(samples.get(name, job.plan.run.value(name)), count).tolist() for name in SETTINGS]
+    settings = Counter(
+        each for each in zip(*values, strict=True) if each[0] > 0.0
+    )  # without a sub-step there is no run
+    return sum(
+        times * seconds(job.plan, settings_of(dict(zip(SETTINGS, each, strict=True))), costs)
+        for each, times in settings.items()
+    )

@@ -21,7 +21,7 @@ from ..fmu.near_names import explains_keywords, must_be_one_of
 from ..host import read_description
 from ..model.error_estimate import ON
 from ..simulation.fmu_run import own_starts
-from .chunks import BATCH_COSTS, NATIVE_COSTS, PYTHON_COSTS, chunk_size
+from .chunks import BATCH_COSTS, NATIVE_COSTS, PYTHON_COSTS, Costs, chunk_size
 from .engines import SETTINGS, Plan
 from .place import Place, place_of
 from .store import RUNS, TRAJECTORIES, WHOLE, Part, Store, store
@@ -175,7 +175,7 @@ def job_of(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place:
     """What goes to the workers."""
     if engine not in ENGINES:
         raise ValueError(must_be_one_of("engine", engine, ENGINES))
-    content, costs = None, BATCH_COSTS
+    content, path = None, None
     if engine == BATCH:
         if fmu is not None:
             raise ValueError(
@@ -186,7 +186,6 @@ def job_of(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place:
     else:
         path = Path(fmu or default_fmu())
         content, own = _content(study, path)
-        costs = PYTHON_COSTS if is_python(path) else NATIVE_COSTS
         study = replace(study, run=study.run.on(own))
     plan = Plan(study.run, study.keep, timeline(study.run, study.keep))
     about = {
@@ -196,7 +195,7 @@ def job_of(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place:
         "fmu_sha256": hashlib.sha256(content).hexdigest() if content else None,
         "hovercraft_fmu": __version__,
         "runs": study.runs,
-        "chunk": chunk_size(plan, study.sampling, costs, LEAST_CHUNKS[engine]),
+        "chunk": chunk_size(plan, study.sampling, costs_of(path), LEAST_CHUNKS[engine]),
         "name": study.name,
         "swept": [factor.name for factor in study.factors],
         "kept": list(study.keep.columns),
@@ -208,6 +207,13 @@ def job_of(study: Study, fmu: str | os.PathLike[str] | None, engine: str, place:
         "machine": f"{platform.system()} {platform.machine()}",
     }  # fmt: skip
     return Job(uuid.uuid4().hex, __version__, plan, study.sampling, content, about, place)
+
+
+def costs_of(fmu: Path | None) -> Costs:
+    """What its runs cost; None: the batch."""
+    if fmu is None:
+        return BATCH_COSTS
+    return PYTHON_COSTS if is_python(fmu) else NATIVE_COSTS
 
 
 def _content(study: Study, path: Path) -> tuple[bytes, dict[str, float | int]]:
