@@ -1,6 +1,7 @@
 """Files that are not what they should be, and places that are hard to live in: one line or none, no crash."""
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -26,12 +27,22 @@ def with_file(name: str, content: bytes) -> Callable[[Files], Files]:
     return lambda files: {**files, name: content}
 
 
+EXCHANGE = b'<ModelExchange modelIdentifier="Hovercraft"/>'
 DESCRIPTION, MODULE = "modelDescription.xml", "resources/slavemodule.txt"
 FORGED: Mapping[str, tuple[Callable[[Files], Files], str]] = {
     "absolute path": (with_file("/etc/evil", b""), "must be an archive that can be extracted; Illegal path"),
     "no description": (without(DESCRIPTION), "must be an FMU with a valid model description"),
     "foreign description": (with_file(DESCRIPTION, b"<other/>"), "must be an FMU with a valid model description"),
     "no text": (with_file(DESCRIPTION, bytes(range(256))), "must be an FMU with a valid model description"),
+    "for solvers alone": (
+        lambda files: {
+            **files,
+            DESCRIPTION: re.sub(
+                rb"<CoSimulation .*?(/>|</CoSimulation>)", EXCHANGE, files[DESCRIPTION], flags=re.DOTALL
+            ),
+        },
+        "must be an FMU for co-simulation, FMI 2.0 or 3.0",
+    ),
     "no binary": (without("binaries"), "Cannot find shared library"),
     "no Python": (without("resources"), "must have resources/slavemodule.txt, which its binary asks for"),
     "another module": (with_file(MODULE, b"nix"), "must have resources/nix.py, which"),

@@ -543,8 +543,10 @@ def test_a_damaged_state_is_refused(data: st.DataObject, shared: tuple[Any, list
     i = data.draw(st.integers(0, len(good) - 1))
     flipped = good[:i] + bytes([good[i] ^ data.draw(st.integers(1, 255))]) + good[i + 1 :]
     bad = data.draw(st.sampled_from([flipped, good[:i], good + good[:1], b"", b"{}"]))
+    beside = another(instance)
     with pytest.raises(FMICallException):
         instance.deSerializeFMUstate(bad)
+    beside.freeInstance()
     assert messages[-1] == f"serialized FMU state of {len(bad)} bytes: must be complete and unchanged"
     assert everything(instance) == before
     instance.setFMUstate(instance.deSerializeFMUstate(good))
