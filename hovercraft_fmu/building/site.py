@@ -2,6 +2,7 @@
 
 import os
 import zipfile
+from collections.abc import Callable
 from html import escape
 from pathlib import Path
 
@@ -13,16 +14,18 @@ PAGES = "documentation/"
 TITLE = "Hovercraft FMU: the pages of each file"
 
 
-def build_site(folder: str | os.PathLike[str]) -> Path:
+def build_site(folder: str | os.PathLike[str], tell: Callable[[float], None] = lambda _: None) -> Path:
     """Write the pages of every FMU and SSP file of this package below `folder`, and a page that lists them.
 
-    Returns that page. Raises OSError: it cannot be written; NotCompiledError: there is no machine code.
+    `tell` is called with the part of the work that is done, 0 to 1. Returns that page. Raises OSError: it cannot be
+    written; NotCompiledError: there is no machine code.
     """
     folder, rows = Path(folder), []
-    for kind, product in PRODUCTS.items():
+    for done, (kind, product) in enumerate(PRODUCTS.items(), 1):
         pages = _write_pages(product, folder / kind)
         first = "index.html" if "index.html" in pages else next(name for name in pages if name.endswith(".html"))
         rows.append(f'<li><a href="{kind}/{first}">{product.name}</a>: {escape(product.purpose)}.</li>')
+        tell(done / len(PRODUCTS))
     style = (FOLDER / "style.css").read_text(encoding="utf-8")
     head = f'<meta charset="utf-8">\n<title>{TITLE}</title>\n<style>\n{style}</style>'
     body = "\n".join([f"<h1>{TITLE}</h1>", "<ul>", *rows, "</ul>"])

@@ -98,7 +98,9 @@ def _demo_of_the_tow(fmu: Path, tether: Path, picture: Path) -> None:
     OUTPUT.print(f"wrote {towed.write_csv(picture.with_suffix('.csv'))}")
     OUTPUT.print(f"wrote {plot_tow(towed, picture)}")
     for suffix in (".gif", ".html"):
-        OUTPUT.print(f"wrote {animate_tow(towed, picture.with_suffix(suffix))}")
+        with progress_of(1.0, "drawing") as tell:
+            path = animate_tow(towed, picture.with_suffix(suffix), tell)
+        OUTPUT.print(f"wrote {path}")
 
 
 def _print_passage(passage: "Passage") -> None:

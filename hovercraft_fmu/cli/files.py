@@ -183,11 +183,11 @@ def _checked_table(checks: "list[Check]") -> str:
 @click.option("--output", type=PathOf(path_type=Path, file_okay=False), metavar="DIR", default=FOLDER / "docs",
               show_default=True)  # fmt: skip
 def docs(output: Path) -> None:
-    """Write the pages of every FMU as a site, for a browser or a web server."""
+    """Write the pages of every FMU and SSP file as a site, for a browser or a web server."""
     from ..building.site import build_site
 
-    with progress_of(1.0, "writing pages"):
-        page = build_site(output)
+    with progress_of(1.0, "writing pages") as tell:
+        page = build_site(output, tell)
     OUTPUT.print(f"wrote {page}: open it in a browser")
 
 

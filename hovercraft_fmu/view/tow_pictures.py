@@ -14,7 +14,7 @@ from ..drawing.shapes import placed
 from ..fmu.icon import outline
 from ..towing import Towed
 from ..whole import write_whole, written
-from .animation import check_animation
+from .animation import Tell, check_animation
 from .film import MOTION, Moving, Towline, film
 
 if TYPE_CHECKING:
@@ -97,8 +97,10 @@ def _draw_craft(axes: "Axes", towed: Towed, i: int) -> None:
     axes.plot(*towed.ends()[i].T, color=INK, linewidth=1.0, linestyle="-" if taut else ":", zorder=4)
 
 
-def animate_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
+def animate_tow(towed: Towed, path: str | os.PathLike[str], tell: Tell = lambda _: None) -> Path:
     """Write both craft on their way, and the line, as a GIF or as a page that needs no network.
+
+    `tell` is called with the part of the work that is done, 0 to 1.
 
     Raises:
         ValueError, ModuleNotFoundError: see `check_animation`.
@@ -115,7 +117,11 @@ def animate_tow(towed: Towed, path: str | os.PathLike[str]) -> Path:
         [bound(bound(towed[f"{craft}.pose.{name}"]) for craft in COLORS) for name in "xy"] for bound in (min, max)
     )
     corners = ((low[0] - room, high[0] + room), (high[1] + room, low[1] - room))
-    first, *rest = (_frame(towed, int(i), corners) for i in chosen)
+    images = []
+    for done, i in enumerate(chosen, 1):
+        images.append(_frame(towed, int(i), corners))
+        tell(done / len(chosen))
+    first, *rest = images
     palette = first.quantize(colors=64, dither=Image.Dither.NONE)
     still, *moving = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in (first, *rest))
     times = [FRAME_TIME] * len(moving) + [LAST_FRAME_TIME]
