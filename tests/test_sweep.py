@@ -1060,6 +1060,11 @@ def test_the_command(tmp_path: Path, shell: Shell) -> None:
     with Image.open(tmp_path / "masses.png") as picture:
         picture.verify()
     assert "6 runs, 0 of them made now" in shell.ok("sweep", "masses.toml", "--workers", "1")
+    part = ("sweep", "masses.toml", "--workers", "1", "--output", "parts", "--part")
+    told = shell.ok(*part, "1/2", "--plot", "parts.png")
+    assert "parts: 3 runs, 3 of them made now in " in told
+    assert "3 of the 6 runs of the study, of other parts, are missing yet; parts.png is drawn when all are" in told
+    assert "least" in shell.ok(*part, "2/2")
     speeds = loaded(tmp_path / "build" / "sweep" / "masses")["end.speed"].drop_null().to_pylist()
     assert len(speeds) == 3
     assert [printed.count(f" {speed:.4g} m/s") for speed in (min(speeds), max(speeds))] == [1, 1]

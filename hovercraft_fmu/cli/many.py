@@ -125,7 +125,10 @@ def sweep(
     if outcome.warned:
         OUTPUT.print(f"{outcome.warned} with warnings of the FMU; see their column")
     if outcome.missing:
-        OUTPUT.print(f"{outcome.missing} runs of the study are missing yet: of other parts")
+        undrawn = f"; {plot} is drawn when all are there" if plot else ""
+        OUTPUT.print(
+            f"{outcome.missing} of the {chosen.runs} runs of the study, of other parts, are missing yet{undrawn}"
+        )
         if as_json:
             print_json({**outcome._asdict(), "seconds": seconds})
         return
@@ -133,7 +136,7 @@ def sweep(
     _print_extremes(found.extremes)
     for event, count, runs in found.unreached:
         numbers = ", ".join(map(str, runs)) + (", ..." if count > len(runs) else "")
-        OUTPUT.print(f"{event}: {count} of {outcome.runs} runs never reached it: run {numbers}")
+        OUTPUT.print(f"{event}: {count} of {chosen.runs} runs never reached it: run {numbers}")
     if as_json:
         extremes, unreached = ([each._asdict() for each in part] for part in found)
         print_json({**outcome._asdict(), "seconds": seconds, "extremes": extremes, "never_reached": unreached})
