@@ -1,5 +1,6 @@
 """The README promises nothing that does not run."""
 
+import os
 import re
 import shlex
 import shutil
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from hovercraft_fmu.sweeps import load
 from tests.conftest import ROOT
 from tests.shell import Shell
 
@@ -62,3 +64,23 @@ def test_pictures_and_links_exist() -> None:
     targets = re.findall(r"\]\(([^)]+)\)", README)
     assert targets
     assert all((ROOT / target).is_file() for target in targets)
+
+
+@pytest.mark.usefixtures("fleet")
+def test_the_job_script_on_the_page_makes_the_sweep(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the variables that SLURM gives to the tasks of an array."""
+    page = (ROOT / "hovercraft_fmu/fmu/documentation/sweeps.html").read_text(encoding="utf-8")
+    (script,) = (block for block in re.findall(r"<pre>\n(.*?)</pre>", page, re.DOTALL) if "#SBATCH --array=1-" in block)
+    (command,) = re.findall(rf"^{OWN}(.*)", script.replace("\\\n", ""), re.MULTILINE)
+    study = (
+        'scene = "turn"\nstop_time = 1.0\nset.step_size = 0.1\nsweep.mass = [60, 80, 100, 120]\nkeep.end = ["speed"]\n'
+    )
+    (shell.folder / "STUDY.toml").write_text(study)
+    monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "2")
+    for number in "21":
+        monkeypatch.setenv("SLURM_ARRAY_TASK_ID", number)
+        words = shlex.split(os.path.expandvars(command).replace("/scratch/me/", ""))
+        printed = shell.ok(*words, "--workers", "1")
+        assert printed.startswith("study: 2 runs, 2 of them made now")
+        assert ("2 runs of the study are missing yet" in printed) == (number == "2")
+    assert load(shell.folder / "study").to_table()["run"].to_pylist() == [0, 1, 2, 3]
