@@ -194,7 +194,7 @@ export class Player {
     this.drawView(follows ? this.far(this.inset) : this.near(this.inset, states), states);
     this.chart.draw((this.time - this.first) / (this.last - this.first));
     write("square", `a square is ${square} m`);
-    write("other", follows ? "The whole path" : "Close up");
+    write("other", follows ? "The whole path" : "Around the craft");
     write("play", this.playing ? "Pause" : "Play");
     write("time", `${this.time.toFixed(Math.max(0, -Math.floor(Math.log10(this.step) + 1e-6)))} s`);
     field("slider").value = String(this.time);
