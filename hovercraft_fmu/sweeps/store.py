@@ -37,8 +37,8 @@ NAME = re.compile(r"\d{5,}\.parquet")
 BLANK = b"0" * 64
 FOOTER = 2**16
 """Bytes at the end of a Parquet file in which its metadata is, but for a study with long inputs."""
-READERS = 16
-"""Files of an object store that are looked at at a time: each takes a round trip."""
+READERS, WAITING = 16, 1000
+"""Threads that look at the files of an object store, where each takes a round trip; and files that wait for them."""
 SEAL = re.compile(rb'"sha256": "([0-9a-f]{64})"')
 
 
@@ -84,12 +84,10 @@ class Store:
         if stated and (numbers or not alone):
             self._check_same(different(stated, about))
         wrong: dict[str, str] = {}
-        with ThreadPoolExecutor(1 if place.folder else READERS) as pool:
-            mine = [number for number in numbers if number in part]
-            for number, found in zip(mine, pool.map(lambda each: _wrong_files(place, each, about), mine), strict=True):
-                wrong |= found
-                if not found:
-                    self.done.add(number)
+        for number, found in _looked_at(place, [number for number in numbers if number in part], about):
+            wrong |= found
+            if not found:
+                self.done.add(number)
         if not self.done:
             self._check_same(next((why for why in wrong.values() if why.startswith(ANOTHER)), ""))
         for name, why in wrong.items():
@@ -185,10 +183,19 @@ def chunk_file(what: str, number: int) -> str:
     return f"{what}/{number:05}.parquet"
 
 
-def _wrong_files(place: Place, number: int, about: Mapping[str, Any]) -> dict[str, str]:
-    """Files of a chunk that are none of that sweep, and why."""
-    files = (chunk_file(what, number) for what in about["files"])
-    return {file: why for file in files if (why := _wrong(place, file, about))}
+def _looked_at(place: Place, chunks: list[int], about: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, str]]]:
+    """Each chunk with those of its files that are none of that sweep, and why; one after the other in a folder."""
+
+    def wrong(chunk: int) -> tuple[int, dict[str, str]]:
+        files = (chunk_file(what, chunk) for what in about["files"])
+        return chunk, {file: why for file in files if (why := _wrong(place, file, about))}
+
+    if place.folder:
+        yield from map(wrong, chunks)
+        return
+    with ThreadPoolExecutor(READERS) as pool:
+        for i in range(0, len(chunks), WAITING):
+            yield from pool.map(wrong, chunks[i : i + WAITING])
 
 
 def _wrong(place: Place, name: str, about: Mapping[str, Any]) -> str:
