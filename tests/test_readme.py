@@ -82,5 +82,5 @@ def test_the_job_script_on_the_page_makes_the_sweep(shell: Shell, monkeypatch: p
         words = shlex.split(os.path.expandvars(command).replace("/scratch/me/", ""))
         printed = shell.ok(*words, "--workers", "1")
         assert printed.startswith("study: 2 runs, 2 of them made now")
-        assert ("2 runs of the study are missing yet" in printed) == (number == "2")
+        assert ("2 of the 4 runs of the study, of other parts, are missing yet" in printed) == (number == "2")
     assert load(shell.folder / "study").to_table()["run"].to_pylist() == [0, 1, 2, 3]
