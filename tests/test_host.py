@@ -1,5 +1,6 @@
 """The way in which the package drives an FMU: the same calls for both standards, co-simulation and model exchange."""
 
+import errno
 from collections.abc import Iterator
 from ctypes import ArgumentError
 from pathlib import Path
@@ -149,6 +150,8 @@ def test_model_exchange(each_native_fmu: Path) -> None:
         craft.get_derivatives(rates, len(rates))
         assert list(rates) == pytest.approx(derivatives(start._replace(heading=1.0), Controls(), Craft()), rel=1e-12)
         assert not craft.complete_step()
+        craft.get_nominals(x, len(x))
+        assert min(x) > 0.0
         craft.enter_event_mode()
 
 
@@ -179,6 +182,27 @@ def test_a_text_is_no_number(craft: Instance, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(craft._variable("thrust"), "type", "String")
     with pytest.raises(ValueError, match="thrust: must be a number; it is of the type String"):
         craft.port("thrust")
+
+
+def test_what_is_no_file_or_has_no_room(tmp_path: Path, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(IsADirectoryError, match="must be an FMU, and is a folder"):
+        Fmu(tmp_path)
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("fmpy.extract", full)
+    with pytest.raises(OSError, match="No space left on device"):
+        Fmu(fmu)
+
+
+def test_what_one_of_fmpys_masters_raises_is_a_refusal(craft: Instance) -> None:
+    with pytest.raises(SimulationError, match=r"^mass = -1\.0: must be greater than 0$"), craft.driven_by_fmpy():
+        (craft.fmpy.setFloat64 if craft.is_fmi_3 else craft.fmpy.setReal)(
+            [craft._variable("mass").valueReference], [-1.0]
+        )
+    with pytest.raises(SimulationError, match="no solver"), craft.driven_by_fmpy():
+        raise RuntimeError("no solver")
 
 
 def test_closed_twice_is_closed_once(opened: Fmu) -> None:
