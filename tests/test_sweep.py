@@ -242,8 +242,8 @@ def test_the_batch_names_an_input_that_no_step_helps_as_the_fmu_does(native_fmu:
     )  # fmt: skip
     sweep(study, native_fmu, workers=1, output=tmp_path / "fmu")
     sweep(study, engine="batch", workers=1, output=tmp_path / "batch")
-    assert bits(load(tmp_path / "batch")).equals(bits(load(tmp_path / "fmu")))
-    errors = [row["error"] for row in rows(load(tmp_path / "batch"))]
+    assert bits(loaded(tmp_path / "batch")).equals(bits(loaded(tmp_path / "fmu")))
+    errors = [row["error"] for row in rows(loaded(tmp_path / "batch"))]
     assert all("external.force.x = -1e+308: must not drive the craft" in error for error in errors[::3])
     assert not any("must not drive" in error for error in [*errors[1::3], *errors[2::3]] if error)
 
