@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from random import Random
 from time import perf_counter
 
 from hovercraft_fmu.fmu.description import NATIVE, Flavour
@@ -26,6 +27,8 @@ WITH_A_MAIN = ("-O1", "-gdwarf-4", "-DALONE")
 DEFAULT = 600
 """s"""
 SEQUENCES = 400
+SEEDS, SEED_SIZE = 50, 1000
+"""Random bytes: of a thousand are some hundred calls."""
 BLOCK, BLOCK_TO_WRITE = "static const struct variant VARIANT", "__attribute__((weak)) struct variant VARIANT"
 """What a library says of itself: here the fuzzer writes into it, as whoever has the file can."""
 
@@ -58,12 +61,22 @@ def compiled(folder: Path, flavour: Flavour = NATIVE, options: tuple[str, ...] =
 
 def fuzz(program: Path, limit: str, **env: str) -> str:
     """Run up to a limit of libFuzzer's; its report. Raises AssertionError with it where there is a finding."""
-    command = [str(program), limit, "-max_len=4000", "-timeout=30", "-seed=1", "-print_final_stats=1", "-verbosity=0"]
+    options = ["-max_len=4000", "-timeout=30", "-seed=1", "-print_final_stats=1", "-verbosity=0"]
+    command = [str(program), limit, *options, str(seeds(program.parent))]
     done = subprocess.run(
         command, cwd=program.parent, env={**os.environ, **env}, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr[-20000:]
     return done.stderr
+
+
+def seeds(folder: Path) -> Path:
+    """What it begins with, in `folder`: left alone it begins with a byte, and long has nothing past its start."""
+    made, random = folder / "seeds", Random(1)
+    made.mkdir(exist_ok=True)
+    for number in range(SEEDS):
+        (made / str(number)).write_bytes(random.randbytes(SEED_SIZE))
+    return made
 
 
 def calls(seconds: int) -> str:
