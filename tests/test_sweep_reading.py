@@ -3,6 +3,7 @@
 import json
 import random
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from hovercraft_fmu._version import __version__
 from hovercraft_fmu.sweeps import load
 from hovercraft_fmu.sweeps.cells import Plane, cells_of
+from hovercraft_fmu.sweeps.charts import draw_sweep
 from hovercraft_fmu.sweeps.reading import overview
 from hovercraft_fmu.sweeps.store import packed, runs_table
 from tests.conftest import Fresh
@@ -23,7 +25,9 @@ SWEPT, KEPT = ["mass", "air_density"], ["end.pose.x", "far.time"]
 RUNS, CHUNK = 1000, 300
 
 
-def store(folder: Path, runs: int = RUNS, chunk: int = CHUNK, side: int = 0) -> NDArray[np.float64]:
+def store(
+    folder: Path, runs: int = RUNS, chunk: int = CHUNK, side: int = 0, swept: Sequence[str] = SWEPT
+) -> NDArray[np.float64]:
     """Files as a sweep writes them, of invented rows: a grid of so many masses, or random numbers.
 
     Gives the rows of SWEPT and KEPT, NaN where there is nothing.
@@ -31,7 +35,7 @@ def store(folder: Path, runs: int = RUNS, chunk: int = CHUNK, side: int = 0) -> 
     study = {"keep": {"events": {"far": {}}}, "sampling": {"method": "grid" if side else "latin_hypercube"}}
     about = {
         "study": json.dumps(study), "engine": "batch", "fmu_sha256": None,
-        "hovercraft_fmu": __version__, "runs": runs, "chunk": chunk, "name": "invented", "swept": SWEPT, "kept": KEPT,
+        "hovercraft_fmu": __version__, "runs": runs, "chunk": chunk, "name": "invented", "swept": swept, "kept": KEPT,
         "files": ["runs"],
     }  # fmt: skip
     dice = np.random.default_rng(1)
@@ -143,6 +147,26 @@ def test_cells_of_a_grid_have_the_mean_of_their_neighbours(tmp_path: Path) -> No
     x = every[2].reshape(400, 5)
     expected = [np.nanmean(x[first : first + 3], axis=0) for first in range(0, 400, 3)]
     np.testing.assert_allclose(cells.values.T, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("swept", "colour"), [(SWEPT[:1], "number"), (SWEPT, "mean")])
+def test_a_picture_of_many_runs_is_one_of_cells(tmp_path: Path, swept: list[str], colour: str) -> None:
+    """It says so. Each panel has its cells: how many runs are in each, or their mean."""
+    every = store(tmp_path, 20_001, 10_000, swept=swept)
+    figure = draw_sweep(tmp_path)
+    figure.canvas.draw()
+    assert figure.get_suptitle() == (
+        f"invented: 20001 runs, 201 failed\nmore than 20000: drawn in cells, each coloured by the {colour} of its runs"
+    )
+    panels = [axes.collections[0].get_array() for axes in figure.axes[:2]]
+    for panel, values in zip(panels, every[2:], strict=True):
+        assert panel is not None
+        cells = np.ma.filled(panel, np.nan)
+        there = values[~np.isnan(values)]
+        if colour == "number":
+            assert np.nansum(cells) == len(there)
+        else:
+            assert there.min() <= np.nanmin(cells) <= np.nanmean(cells) <= np.nanmax(cells) <= there.max()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the most memory of a process is told by Linux")

@@ -97,8 +97,8 @@ def _in_cells(runs: ds.Dataset, about: Mapping[str, Any]) -> tuple["Figure", str
         figure: Figure = axes.figure  # type: ignore[assignment]
         figure.colorbar(image, ax=axes, label="" if means else "runs in a cell")
 
-    shown = "mean of the runs" if means else "number of runs"
-    return _panels(panels, len(swept), draw), f"\nmore than {MOST_POINTS}: drawn in cells, its colour the {shown} in it"
+    by = "the mean of its runs" if means else "the number of its runs"
+    return _panels(panels, len(swept), draw), f"\nmore than {MOST_POINTS}: drawn in cells, each coloured by {by}"
 
 
 def _is_grid(about: Mapping[str, Any]) -> bool:
