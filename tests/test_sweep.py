@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -44,6 +45,7 @@ from hovercraft_fmu.sweeps.place import Place, place_of
 from hovercraft_fmu.sweeps.quantities import FORMULAS, OBSERVED
 from hovercraft_fmu.sweeps.sampling import Factor, Sampling
 from hovercraft_fmu.sweeps.seen import check_seen
+from hovercraft_fmu.sweeps.store import store
 from hovercraft_fmu.sweeps.timeline import Leg, merged, timeline
 from hovercraft_fmu.sweeps.work import DRIVERS, Job, make_chunk
 from tests.conftest import FMI_2
@@ -679,11 +681,20 @@ def test_an_address_that_cannot_be(address: str, message: str, monkeypatch: pyte
     assert "secret" not in str(refused.value)
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+@pytest.mark.skipif(not hasattr(os, "seteuid"), reason="users of POSIX")
 def test_a_folder_without_permission(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(PermissionError, match=str(tmp_path / "new")):
-        sweep(MASSES, engine="batch", workers=1, output=tmp_path / "new")
+    """It is named; root, who may write anywhere, tries it as nobody."""
+    about = runner_module.job_of(read_study(MASSES), None, "batch", place_of(tmp_path)).about
+    user = os.geteuid()
+    with tempfile.TemporaryDirectory() as place:
+        Path(place).chmod(0o555)
+        os.seteuid(user or 65534)
+        try:
+            with pytest.raises(PermissionError) as refused, store(place_of(f"{place}/new"), about):
+                pass
+        finally:
+            os.seteuid(user)
+    assert refused.value.filename == f"{place}/new"
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
