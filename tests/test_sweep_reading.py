@@ -26,11 +26,11 @@ RUNS, CHUNK = 1000, 300
 
 
 def store(
-    folder: Path, runs: int = RUNS, chunk: int = CHUNK, side: int = 0, swept: Sequence[str] = SWEPT
+    folder: Path, runs: int = RUNS, chunk: int = CHUNK, side: int = 0, swept: Sequence[str] = SWEPT, far: bool = False
 ) -> NDArray[np.float64]:
     """Files as a sweep writes them, of invented rows: a grid of so many masses, or random numbers.
 
-    Gives the rows of SWEPT and KEPT, NaN where there is nothing.
+    Where they are `far`, x is infinite. Gives the rows of SWEPT and KEPT, NaN where there is nothing.
     """
     study = {"keep": {"events": {"far": {}}}, "sampling": {"method": "grid" if side else "latin_hypercube"}}
     about = {
@@ -43,6 +43,7 @@ def store(
     if side:
         every[:2] = np.unravel_index(np.arange(runs), (side, -(-runs // side)))
     every[3, every[3] > 1.0] = np.nan
+    every[2] += np.inf if far else 0.0
     every[2:, ::100] = np.nan  # they failed
     (folder / "runs").mkdir(parents=True)
     for number, first in enumerate(range(0, runs, chunk)):
@@ -113,11 +114,12 @@ def test_a_file_of_another_sweep_is_refused_where_it_is_read(tmp_path: Path) -> 
         runs.to_table()
 
 
-def test_least_and_greatest_are_those_of_all_rows(tmp_path: Path) -> None:
-    every = store(tmp_path)
+@pytest.mark.parametrize("far", [False, True])
+def test_least_and_greatest_are_those_of_all_rows(tmp_path: Path, far: bool) -> None:
+    every = store(tmp_path, far=far)
     found = overview(tmp_path)
     for extreme, values in zip(found.extremes, every[2:], strict=True):
-        low, high = np.nanargmin(values), np.nanargmax(values)
+        low, high = (1, 1) if np.isinf(values).any() else (np.nanargmin(values), np.nanargmax(values))
         assert (extreme.least, extreme.greatest) == (values[low], values[high])
         assert list(extreme.least_run.values()) == every[:2, low].tolist()
         assert list(extreme.greatest_run.values()) == every[:2, high].tolist()

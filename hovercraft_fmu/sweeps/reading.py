@@ -173,8 +173,10 @@ def overview(folder: str | os.PathLike[str]) -> Overview:
     for rows in batches(runs, ["run", *swept, *kept, "error"]):
         for name in kept:
             values = numbers_of(rows, name)
-            if not np.isnan(values).all():
-                low, high = (_value(rows, int(i), name, swept) for i in (np.nanargmin(values), np.nanargmax(values)))
+            there = np.flatnonzero(~np.isnan(values))  # nanargmin takes a NaN where all others are infinite
+            if there.size:
+                ends = there[values[there].argmin()], there[values[there].argmax()]
+                low, high = (_value(rows, int(i), name, swept) for i in ends)
                 least[name] = min(least.get(name, low), low, key=_VALUE)  # of equal ones the first
                 greatest[name] = max(greatest.get(name, high), high, key=_VALUE)
         for name, sofar in missed.items():
