@@ -7,10 +7,11 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
-from PIL import Image
+from PIL import Image, ImageColor
 
 from hovercraft_fmu.autopilot import pilot_package
 from hovercraft_fmu.building import PRODUCTS
+from hovercraft_fmu.drawing.palette import PORT, STARBOARD
 from hovercraft_fmu.fmu import document
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour
 from hovercraft_fmu.fmu.document import FOLDER
@@ -61,6 +62,15 @@ def test_the_pages_of_autopilot_and_tether_show_what_the_tables_say() -> None:
     assert pilot_package.VOYAGES.read_bytes() == voyages()
     for chart, (tables, _) in CHARTS.items():
         assert f"<dc:source>{shown(tables)}</dc:source>" in chart.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("color", [PORT, STARBOARD])
+def test_a_smaller_palette_leaves_the_thrusters_their_colours(color: str) -> None:
+    """As they are drawn, half through, on white: of 32 colours of the picture none was near."""
+    drawn = [0.55 * each + 0.45 * 255.0 for each in ImageColor.getrgb(color)]
+    with Image.open(pilot_package.HERE / pilot_package.PICTURE) as picture:
+        found = picture.convert("RGB").getcolors() or []
+    assert min(max(abs(a - b) for a, b in zip(each, drawn, strict=True)) for _, each in found) < 6.0
 
 
 def test_what_is_to_be_read_in_a_picture_is_not_cut() -> None:

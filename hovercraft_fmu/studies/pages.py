@@ -81,6 +81,8 @@ DRAWN: Mapping[str, Callable[..., "Figure"]] = {
 """Those that are drawn of their tables alone, as lines."""
 COLORS = 24
 """Of a picture's palette: lines and markers need few."""
+COLORS_OF_SHIPS = 48
+"""Of a picture with outlines that are filled: with fewer the two thrusters lose their colours, or the craft theirs."""
 SHOWS = "Shows"
 """The key in a picture under which it says what it shows."""
 
@@ -121,10 +123,10 @@ def voyages() -> bytes:
     return text(pl.read_csv(RESULTS / "coupling_voyages.csv").drop("voyage", "missed")).encode() + b"\n"
 
 
-def in_palette(picture: Path, shows: str) -> bytes:
-    """A PNG as small as it can be, which says what it shows; small areas (the thrusters) keep their colours."""
+def in_palette(picture: Path, shows: str, colors: int = COLORS) -> bytes:
+    """A PNG as small as it can be, which says what it shows."""
     with Image.open(picture) as colored:
-        image = colored.convert("RGB").quantize(COLORS, Image.Quantize.MAXCOVERAGE, kmeans=6, dither=Image.Dither.NONE)
+        image = colored.convert("RGB").quantize(colors, Image.Quantize.MEDIANCUT, kmeans=6, dither=Image.Dither.NONE)
     note, content = PngImagePlugin.PngInfo(), io.BytesIO()
     note.add_text(SHOWS, shows)
     image.save(content, "PNG", optimize=True, pnginfo=note)
@@ -163,7 +165,7 @@ def assemble(results: Path = RESULTS) -> list[Path]:
             if picture:
                 files[PACKED / name] = in_palette(picture, shown(PICTURES[name]))
         for package in (pilot_package, tether_package):
-            files[package.HERE / package.PICTURE] = in_palette(Path(folder) / package.PICTURE, "")
+            files[package.HERE / package.PICTURE] = in_palette(Path(folder) / package.PICTURE, "", COLORS_OF_SHIPS)
         files[RESULT] = default_result(build_native_fmu(Path(folder) / "HovercraftNative.fmu"))
     for path, content in files.items():
         write_whole(path, content)
