@@ -2,12 +2,14 @@
 
 import json
 import os
+import random
 import shutil
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +17,15 @@ import pytest
 
 PATIENCE = 120.0
 """s, for a process to begin on a busy machine."""
+
+
+def _free_port() -> int:
+    """None of those that the system gives who connects: a worker that looks for a lost scheduler could meet itself."""
+    while True:
+        port = random.randrange(10_000, 30_000)
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 class Identity(NamedTuple):
@@ -43,31 +54,41 @@ class Cluster:
     def __init__(self, folder: Path, identity: Identity, environment: Mapping[str, str]) -> None:
         self.tls = identity
         self.workers: list[subprocess.Popen[bytes]] = []
-        self._folder, self._environment, self._port = folder, {**os.environ, **environment}, 0
+        self._folder, self._environment, self._port = folder, {**os.environ, **environment}, _free_port()
         self.start_scheduler()
 
     def start_scheduler(self) -> None:
         """Where it was, if it is started again."""
         there = self._folder / "scheduler.json"
         there.unlink(missing_ok=True)
-        own = ("--host", "127.0.0.1", "--protocol", "tls", "--scheduler-file", str(there))
-        self.scheduler = self._started("scheduler", *own, "--port", str(self._port))
+        own = ("--scheduler-file", str(there), "--protocol", "tls", "--port", str(self._port))
+        own += ("--dashboard-address", "127.0.0.1:0", "--idle-timeout", "10 minutes")  # who is killed closes nothing
+        self.scheduler = self._started("scheduler", *own)
         deadline = time.monotonic() + PATIENCE
         while not (there.exists() and (content := there.read_text())):
             assert self.scheduler.poll() is None, self.said()
             assert time.monotonic() < deadline
             time.sleep(0.05)
         self.address: str = json.loads(content)["address"]
-        self._port = int(self.address.rpartition(":")[2])
 
     def start_workers(self, count: int) -> None:
         """They are waited for where they are needed."""
-        own = ("--nthreads", "1", "--no-nanny", "--host", "127.0.0.1", "--local-directory", str(self._folder))
+        own = ("--nthreads", "1", "--no-nanny", "--local-directory", str(self._folder), "--death-timeout", "2 minutes")
         self.workers += [self._started("worker", self.address, *own) for _ in range(count)]
 
     def _started(self, what: str, *arguments: str) -> subprocess.Popen[bytes]:
         files = ("--tls-ca-file", self.tls.ca, "--tls-cert", self.tls.cert, "--tls-key", self.tls.key)
-        command = [sys.executable, "-m", "dask", what, *arguments, "--no-dashboard", *map(str, files)]
+        command = [
+            sys.executable,
+            "-m",
+            "dask",
+            what,
+            *arguments,
+            "--host",
+            "127.0.0.1",
+            "--no-dashboard",
+            *map(str, files),
+        ]
         with (self._folder / "said.txt").open("ab") as said:
             return subprocess.Popen(command, stdout=said, stderr=said, env=self._environment, cwd=self._folder)
 

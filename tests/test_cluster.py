@@ -1,0 +1,244 @@
+"""Sweeps on a cluster, over TLS, into an object store, over HTTP: what fails loses nothing and doubles nothing."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pytest
+import s3fs
+
+from hovercraft_fmu import SimulationError
+from hovercraft_fmu.sweeps import load, place, runner, sweep
+from tests.clusters import Cluster, cluster
+from tests.object_store import FORBIDDEN, SLOW_DOWN, ObjectStore, every, object_store
+from tests.shell import Shell
+
+CHUNKS, RUNS = 12, 240
+STUDY: dict[str, Any] = {
+    "scene": "turn",
+    "stop_time": 15.0,
+    "set": {"integrator": "rk4", "step_size": 0.1},
+    "sweep": {"mass": {"from": 60.0, "to": 170.0}, "inertia": {"normal": [500.0, 20.0]}},
+    "sampling": {"method": "latin_hypercube", "runs": RUNS, "seed": 1},
+    "keep": {"end": ["pose.x", "pose.y", "speed"], "distance": True},
+}
+
+
+@pytest.fixture(autouse=True)
+def _many_chunks_and_no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where seconds of work would be one chunk of such a study."""
+    monkeypatch.setitem(runner.LEAST_CHUNKS, "batch", CHUNKS)
+    monkeypatch.setattr(place, "PAUSES", (0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def store() -> Iterator[ObjectStore]:
+    """Where every process of the tests finds it."""
+    with object_store() as served, pytest.MonkeyPatch.context() as patch:
+        for name, value in served.environment.items():
+            patch.setenv(name, value)
+        yield served
+
+
+@pytest.fixture
+def bucket(store: ObjectStore, request: pytest.FixtureRequest) -> Iterator[str]:
+    """An empty one."""
+    name = f"b{abs(hash(request.node.name))}"
+    s3fs.S3FileSystem().mkdir(name)
+    yield name
+    store.refuse = None
+
+
+@pytest.fixture(scope="module")
+def farm(store: ObjectStore, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """Of two workers."""
+    with cluster(tmp_path_factory.mktemp("farm"), 2, store.environment) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory: pytest.TempPathFactory) -> pa.Table:
+    """The rows of the study, made by one process, as one chunk after the other comes."""
+    folder = tmp_path_factory.mktemp("right")
+    assert sweep(STUDY, engine="batch", workers=1, output=folder).new == RUNS
+    return rows(folder)
+
+
+def rows(output: str | Path) -> pa.Table:
+    """What must be the same, to the bit: all but the metadata."""
+    return load(output).to_table().replace_schema_metadata(None)
+
+
+def swept(output: str | Path, farm: Cluster | None = None, **options: Any) -> runner.Outcome:
+    there = {"scheduler": farm.address, "tls": tuple(farm.tls)} if farm else {}
+    return sweep(STUDY, engine="batch", output=output, **there, **options)
+
+
+def once(runs: int, action: Callable[[], None]) -> Callable[[int], None]:
+    """Told how many runs are done: does something as soon as they are so many, and not all."""
+    acted: list[int] = []
+
+    def tell(done: int) -> None:
+        if not acted and runs <= done < RUNS:
+            acted.append(done)
+            action()
+
+    return tell
+
+
+# ---- the same rows, whoever makes them and wherever they are
+
+
+def test_the_rows_are_those_of_one_process(farm: Cluster, bucket: str, tmp_path: Path, right: pa.Table) -> None:
+    for output in (tmp_path / "folder", f"s3://{bucket}/cluster"):
+        assert swept(output, farm).new == RUNS
+        assert rows(output).equals(right)
+    assert swept(f"s3://{bucket}/processes", workers=4).new == RUNS
+    assert rows(f"s3://{bucket}/processes").equals(right)
+
+
+def test_parts_are_the_whole(farm: Cluster, bucket: str, right: pa.Table) -> None:
+    """Each made by another: a cluster, processes, this one."""
+    output = f"s3://{bucket}/parts"
+    made = [swept(output, part="2/3", workers=1), swept(output, farm, part="3/3"), swept(output, part="1/3", workers=2)]
+    assert [each.new for each in made] == [RUNS // 3] * 3
+    assert [each.missing for each in made] == [2 * RUNS // 3, RUNS // 3, 0]
+    assert rows(output).equals(right)
+
+
+# ---- what fails
+
+
+def test_what_a_killed_worker_had_others_make(farm: Cluster, tmp_path: Path, right: pa.Table) -> None:
+    victim = farm.workers[0]
+    try:
+        outcome = swept(tmp_path, farm, tell=once(40, lambda: farm.kill(victim)))
+    finally:
+        farm.start_workers(1)
+    assert victim not in farm.workers
+    assert (outcome.new, outcome.missing) == (RUNS, 0)
+    assert rows(tmp_path).equals(right)
+    assert left(tmp_path) == []
+
+
+def left(folder: Path) -> list[str]:
+    """Files that were begun."""
+    return [path.name for path in folder.rglob(".*.parquet*")]
+
+
+def test_a_scheduler_that_is_gone(farm: Cluster, tmp_path: Path, right: pa.Table) -> None:
+    """One line; when it is back, with workers, the same command goes on where it was."""
+    with pytest.raises(SimulationError, match="the scheduler is gone, or was restarted: what was made is there"):
+        swept(tmp_path, farm, tell=once(40, lambda: farm.kill(farm.scheduler)))
+    for worker in list(farm.workers):
+        farm.kill(worker)
+    farm.start_scheduler()
+    farm.start_workers(2)
+    there = len(list((tmp_path / "runs").glob("[!.]*.parquet"))) * RUNS // CHUNKS
+    outcome = swept(tmp_path, farm)
+    assert 40 <= there == RUNS - outcome.new
+    assert rows(tmp_path).equals(right)
+
+
+def test_a_store_that_fails_now_and_then(farm: Cluster, store: ObjectStore, bucket: str, right: pa.Table) -> None:
+    """It is asked again, here and by workers."""
+    for name, options in (("cluster", {"farm": farm}), ("process", {"workers": 1})):
+        store.refuse, store.refused = every(3), 0
+        assert swept(f"s3://{bucket}/{name}", **options).new == RUNS
+        assert store.refused >= CHUNKS // 3
+        store.refuse = None
+        assert rows(f"s3://{bucket}/{name}").equals(right)
+
+
+def test_a_store_that_fails_for_good(store: ObjectStore, bucket: str, right: pa.Table) -> None:
+    """One line; what was made before is there, and the same command goes on."""
+
+    def refuse(method: str, path: str) -> str | None:
+        return SLOW_DOWN if method == "PUT" and path.endswith("/00007.parquet") else None
+
+    output = f"s3://{bucket}/study"
+    store.refuse, store.refused = refuse, 0
+    with pytest.raises(OSError, match=r"must be a place that can be read and written; OSError: .*Service Unavailable"):
+        swept(output, workers=1)
+    assert store.refused == 1 + len(place.PAUSES)
+    store.refuse = None
+    assert swept(output, workers=1).new == RUNS - 7 * RUNS // CHUNKS
+    assert rows(output).equals(right)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system with room for less than the study."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = shutil.which("mount")
+    if not mount or subprocess.run([mount, "-t", "tmpfs", "-o", "size=64k", "tmpfs", folder], check=False).returncode:
+        pytest.skip("this user may not mount a file system")
+    yield folder
+    subprocess.run(["umount", folder], check=True)
+
+
+def test_a_store_that_is_full(small_disk: Path, shell: Shell, right: pa.Table) -> None:
+    """One line; after there is room the same command goes on."""
+    (shell.folder / "many.toml").write_text(TOML)
+    command = ("sweep", "many.toml", "--engine", "batch", "--workers", "1", "--output", str(small_disk))
+    assert "with room for it (No space left on device)" in shell.refused(*command)
+    assert left(small_disk) == []
+    there = len(list((small_disk / "runs").iterdir())) * RUNS // CHUNKS
+    subprocess.run(["mount", "-o", "remount,size=8m", small_disk], check=True)
+    assert f"{RUNS} runs, {RUNS - there} of them made now" in shell.ok(*command)
+    assert 0 < there < RUNS
+    assert rows(small_disk).equals(right)
+
+
+TOML = f"""
+scene = "turn"
+stop_time = 15.0
+set.integrator = "rk4"
+set.step_size = 0.1
+sweep.mass = {{ from = 60.0, to = 170.0 }}
+sweep.inertia = {{ normal = [500.0, 20.0] }}
+sampling = {{ method = "latin_hypercube", runs = {RUNS}, seed = 1 }}
+keep.end = ["pose.x", "pose.y", "speed"]
+keep.distance = true
+"""
+
+
+def test_two_who_start_one_study(bucket: str, tmp_path: Path, right: pa.Table) -> None:
+    """In a folder the second is refused; in a store each makes what it finds missing, and the rows are the same."""
+
+    def refused() -> None:
+        with pytest.raises(ValueError, match="another sweep is at work here: wait for it"):
+            swept(tmp_path, workers=1)
+
+    assert swept(tmp_path, workers=1, tell=once(60, refused)).new == RUNS
+    assert rows(tmp_path).equals(right)
+
+    second: list[int] = []
+    output = f"s3://{bucket}/study"
+    first = swept(output, workers=1, tell=once(60, lambda: second.append(swept(output, workers=1).new)))
+    assert (first.new, second) == (RUNS, [RUNS - 60])
+    assert rows(output).equals(right)
+
+
+def test_a_store_that_cannot_be_used_is_one_line(store: ObjectStore, bucket: str, shell: Shell) -> None:
+    (shell.folder / "many.toml").write_text(TOML)
+    command = ("sweep", "many.toml", "--engine", "batch", "--workers", "1", "--output")
+    no_bucket = shell.refused(*command, "s3://no-such-bucket/study")
+    assert "output = 's3://no-such-bucket/study': must be a place that can be read and written" in no_bucket
+    assert "bucket does not exist" in no_bucket
+    assert not s3fs.S3FileSystem().exists("no-such-bucket")
+    store.refuse = lambda method, _: FORBIDDEN if method == "PUT" else None
+    assert "PermissionError: Forbidden" in shell.refused(*command, f"s3://{bucket}/study")
+    assert "pip install gcsfs" in shell.refused(*command, "gs://bucket/study")
+
+
+def test_nobody_without_a_key_is_let_in(farm: Cluster, tmp_path: Path) -> None:
+    plain = farm.address.replace("tls://", "tcp://")
+    with pytest.raises(OSError, match="must be there"):
+        sweep(STUDY, engine="batch", scheduler=plain, output=tmp_path)
+    assert os.listdir(tmp_path) in (["sweep.json", ".lock"], [".lock", "sweep.json"])
