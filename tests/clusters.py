@@ -62,8 +62,8 @@ class Cluster:
         there = self._folder / "scheduler.json"
         there.unlink(missing_ok=True)
         own = ("--scheduler-file", str(there), "--protocol", "tls", "--port", str(self._port))
-        own += ("--dashboard-address", "127.0.0.1:0", "--idle-timeout", "10 minutes")  # who is killed closes nothing
-        self.scheduler = self._started("scheduler", *own)
+        alone = ("--dashboard-address", "127.0.0.1:0", "--idle-timeout", "10 minutes")  # a test may be killed
+        self.scheduler = self._started("scheduler", *own, *alone)
         deadline = time.monotonic() + PATIENCE
         while not (there.exists() and (content := there.read_text())):
             assert self.scheduler.poll() is None, self.said()

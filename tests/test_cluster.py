@@ -1,6 +1,5 @@
 """Sweeps on a cluster, over TLS, into an object store, over HTTP: what fails loses nothing and doubles nothing."""
 
-import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
@@ -54,13 +53,6 @@ def bucket(store: ObjectStore, request: pytest.FixtureRequest) -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def farm(store: ObjectStore, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """Of two workers."""
-    with cluster(tmp_path_factory.mktemp("farm"), 2, store.environment) as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
 def right(tmp_path_factory: pytest.TempPathFactory) -> pa.Table:
     """The rows of the study, made by one process, as one chunk after the other comes."""
     folder = tmp_path_factory.mktemp("right")
@@ -74,7 +66,7 @@ def rows(output: str | Path) -> pa.Table:
 
 
 def swept(output: str | Path, farm: Cluster | None = None, **options: Any) -> runner.Outcome:
-    there = {"scheduler": farm.address, "tls": tuple(farm.tls)} if farm else {}
+    there: dict[str, Any] = {"scheduler": farm.address, "tls": tuple(farm.tls)} if farm else {}
     return sweep(STUDY, engine="batch", output=output, **there, **options)
 
 
@@ -93,18 +85,62 @@ def once(runs: int, action: Callable[[], None]) -> Callable[[int], None]:
 # ---- the same rows, whoever makes them and wherever they are
 
 
-def test_the_rows_are_those_of_one_process(farm: Cluster, bucket: str, tmp_path: Path, right: pa.Table) -> None:
-    for output in (tmp_path / "folder", f"s3://{bucket}/cluster"):
-        assert swept(output, farm).new == RUNS
-        assert rows(output).equals(right)
-    assert swept(f"s3://{bucket}/processes", workers=4).new == RUNS
-    assert rows(f"s3://{bucket}/processes").equals(right)
+def test_on_a_cluster(store: ObjectStore, bucket: str, tmp_path: Path, right: pa.Table) -> None:
+    """All on one: it takes seconds to start."""
+    with cluster(tmp_path, 2, store.environment) as farm:
+        for output in (tmp_path / "folder", f"s3://{bucket}/study"):
+            assert swept(output, farm).new == RUNS
+            assert rows(output).equals(right)
+        assert_who_has_no_key_is_kept_out(farm, tmp_path / "stranger")
+        assert_a_store_may_fail_now_and_then(store, f"s3://{bucket}/failing", right, farm)
+        assert_what_a_killed_worker_had_others_make(farm, tmp_path / "worker", right)
+        assert_it_goes_on_when_the_scheduler_is_back(farm, tmp_path / "scheduler", right)
 
 
-def test_parts_are_the_whole(farm: Cluster, bucket: str, right: pa.Table) -> None:
-    """Each made by another: a cluster, processes, this one."""
+def assert_who_has_no_key_is_kept_out(farm: Cluster, folder: Path) -> None:
+    plain = farm.address.replace("tls://", "tcp://")
+    with pytest.raises(OSError, match="must be there"):
+        sweep(STUDY, engine="batch", scheduler=plain, output=folder)
+    assert not (folder / "runs").exists()
+
+
+def assert_what_a_killed_worker_had_others_make(farm: Cluster, folder: Path, right: pa.Table) -> None:
+    victim = farm.workers[0]
+    outcome = swept(folder, farm, tell=once(40, lambda: farm.kill(victim)))
+    assert victim not in farm.workers
+    assert (outcome.new, outcome.missing) == (RUNS, 0)
+    assert rows(folder).equals(right)
+
+
+def assert_it_goes_on_when_the_scheduler_is_back(farm: Cluster, folder: Path, right: pa.Table) -> None:
+    """One line; with workers again the same command goes on where it was."""
+    with pytest.raises(SimulationError, match="the scheduler is gone, or was restarted: what was made is there"):
+        swept(folder, farm, tell=once(40, lambda: farm.kill(farm.scheduler)))
+    for worker in list(farm.workers):
+        farm.kill(worker)
+    farm.start_scheduler()
+    farm.start_workers(1)
+    there = len(list((folder / "runs").glob("[!.]*.parquet"))) * RUNS // CHUNKS
+    assert 40 <= there == RUNS - swept(folder, farm).new
+    assert rows(folder).equals(right)
+
+
+def assert_a_store_may_fail_now_and_then(
+    store: ObjectStore, output: str, right: pa.Table, farm: Cluster | None
+) -> None:
+    """It is asked again."""
+    store.refuse, store.refused = every(3), 0
+    assert swept(output, farm, workers=None if farm else 1).new == RUNS
+    assert store.refused >= CHUNKS // 3
+    store.refuse = None
+    assert rows(output).equals(right)
+
+
+@pytest.mark.once
+def test_parts_are_the_whole(bucket: str, right: pa.Table) -> None:
+    """Each made by another number of processes, in any order."""
     output = f"s3://{bucket}/parts"
-    made = [swept(output, part="2/3", workers=1), swept(output, farm, part="3/3"), swept(output, part="1/3", workers=2)]
+    made = [swept(output, part=f"{k}/3", workers=workers) for k, workers in ((2, 4), (3, 1), (1, 2))]
     assert [each.new for each in made] == [RUNS // 3] * 3
     assert [each.missing for each in made] == [2 * RUNS // 3, RUNS // 3, 0]
     assert rows(output).equals(right)
@@ -113,45 +149,8 @@ def test_parts_are_the_whole(farm: Cluster, bucket: str, right: pa.Table) -> Non
 # ---- what fails
 
 
-def test_what_a_killed_worker_had_others_make(farm: Cluster, tmp_path: Path, right: pa.Table) -> None:
-    victim = farm.workers[0]
-    try:
-        outcome = swept(tmp_path, farm, tell=once(40, lambda: farm.kill(victim)))
-    finally:
-        farm.start_workers(1)
-    assert victim not in farm.workers
-    assert (outcome.new, outcome.missing) == (RUNS, 0)
-    assert rows(tmp_path).equals(right)
-    assert left(tmp_path) == []
-
-
-def left(folder: Path) -> list[str]:
-    """Files that were begun."""
-    return [path.name for path in folder.rglob(".*.parquet*")]
-
-
-def test_a_scheduler_that_is_gone(farm: Cluster, tmp_path: Path, right: pa.Table) -> None:
-    """One line; when it is back, with workers, the same command goes on where it was."""
-    with pytest.raises(SimulationError, match="the scheduler is gone, or was restarted: what was made is there"):
-        swept(tmp_path, farm, tell=once(40, lambda: farm.kill(farm.scheduler)))
-    for worker in list(farm.workers):
-        farm.kill(worker)
-    farm.start_scheduler()
-    farm.start_workers(2)
-    there = len(list((tmp_path / "runs").glob("[!.]*.parquet"))) * RUNS // CHUNKS
-    outcome = swept(tmp_path, farm)
-    assert 40 <= there == RUNS - outcome.new
-    assert rows(tmp_path).equals(right)
-
-
-def test_a_store_that_fails_now_and_then(farm: Cluster, store: ObjectStore, bucket: str, right: pa.Table) -> None:
-    """It is asked again, here and by workers."""
-    for name, options in (("cluster", {"farm": farm}), ("process", {"workers": 1})):
-        store.refuse, store.refused = every(3), 0
-        assert swept(f"s3://{bucket}/{name}", **options).new == RUNS
-        assert store.refused >= CHUNKS // 3
-        store.refuse = None
-        assert rows(f"s3://{bucket}/{name}").equals(right)
+def test_a_store_that_fails_now_and_then(store: ObjectStore, bucket: str, right: pa.Table) -> None:
+    assert_a_store_may_fail_now_and_then(store, f"s3://{bucket}/study", right, None)
 
 
 def test_a_store_that_fails_for_good(store: ObjectStore, bucket: str, right: pa.Table) -> None:
@@ -168,6 +167,11 @@ def test_a_store_that_fails_for_good(store: ObjectStore, bucket: str, right: pa.
     store.refuse = None
     assert swept(output, workers=1).new == RUNS - 7 * RUNS // CHUNKS
     assert rows(output).equals(right)
+
+
+def left(folder: Path) -> list[str]:
+    """Files that were begun."""
+    return [path.name for path in folder.rglob(".*.parquet*")]
 
 
 @pytest.fixture
@@ -235,10 +239,3 @@ def test_a_store_that_cannot_be_used_is_one_line(store: ObjectStore, bucket: str
     store.refuse = lambda method, _: FORBIDDEN if method == "PUT" else None
     assert "PermissionError: Forbidden" in shell.refused(*command, f"s3://{bucket}/study")
     assert "pip install gcsfs" in shell.refused(*command, "gs://bucket/study")
-
-
-def test_nobody_without_a_key_is_let_in(farm: Cluster, tmp_path: Path) -> None:
-    plain = farm.address.replace("tls://", "tcp://")
-    with pytest.raises(OSError, match="must be there"):
-        sweep(STUDY, engine="batch", scheduler=plain, output=tmp_path)
-    assert os.listdir(tmp_path) in (["sweep.json", ".lock"], [".lock", "sweep.json"])
