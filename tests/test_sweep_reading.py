@@ -78,8 +78,8 @@ def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
     runs = load(tmp_path)
     assert load(tmp_path, check=False).to_table() == load(tmp_path).to_table()
     (tmp_path / "runs" / "00002.parquet").write_bytes(b"spoiled")
-    few = pc.field("run").isin([5, 299, 901])
-    assert runs.to_table(filter=few)["run"].to_pylist() == [5, 299, 901]
+    few = (pc.field("run") < 2) | (pc.field("run") == 901)
+    assert runs.to_table(filter=few)["run"].to_pylist() == [0, 1, 901]
     for use in (runs.to_table, runs.count_rows, lambda: list(runs.to_batches()), lambda: overview(tmp_path)):
         with pytest.raises(ValueError, match=r"runs/00002\.parquet: is no file of a sweep, or cut.* makes it anew$"):
             use()
