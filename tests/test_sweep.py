@@ -619,6 +619,13 @@ def test_parts_are_the_whole(tmp_path: Path) -> None:
         sweep(study, engine="batch", workers=1, output=there, part="1/3", overwrite=True)
 
 
+def test_a_folder_may_have_any_name(tmp_path: Path) -> None:
+    folder = tmp_path / "a::b" / "ä *?[#]"
+    assert sweep(MASSES, engine="batch", workers=1, output=folder).folder == folder
+    assert sweep(MASSES, engine="batch", workers=1, output=f"file://{tmp_path}/c").folder == tmp_path / "c"
+    assert load(folder).to_table() == load(tmp_path / "c").to_table()
+
+
 @pytest.mark.parametrize("part", ["3/2", "0/2", "x", "1/0", "-1/2", "1/2/3", "1.0/2", "", "1"])
 def test_a_part_that_is_none(part: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=f"part = '{part}': must be k/n with k from 1 to n, as 2/8"):

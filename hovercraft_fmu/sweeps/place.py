@@ -169,6 +169,10 @@ def _protocols(store: Any) -> tuple[str, ...]:
 
 @lru_cache(maxsize=8)
 def _store(address: str) -> tuple[Any, str]:
+    if not ADDRESS.fullmatch(address):  # in which url_to_fs would take :: and the like for its own
+        from fsspec.implementations.local import LocalFileSystem
+
+        return LocalFileSystem(), address
     from fsspec.core import url_to_fs
 
     found: tuple[Any, str] = url_to_fs(address)
