@@ -12,6 +12,7 @@ import pytest
 from hovercraft_fmu.fmu.interface import STATES
 from hovercraft_fmu.host import Fmu, Instance, SimulationError
 from hovercraft_fmu.host.messages import CALLBACKS_2
+from hovercraft_fmu.host.ramps import Ramps
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, derivatives
 from hovercraft_fmu.model.integrators import integrator
@@ -242,3 +243,41 @@ def test_fmi_3_has_no_slopes_to_set(native3_fmu: Path) -> None:
     refused = pytest.raises(ValueError, match=r"slopes: must be of inputs of FMI 2\.0")
     with Fmu(native3_fmu) as fmu, fmu.instance() as craft, refused:
         craft.port("thrust").set_slopes([1.0])
+
+
+LEGS = [(0.0, 0.1, [5.0], [5.0], True), (0.1, 0.2, [5.0], [9.0], True), (0.2, 0.3, [9.0], [9.0], False),
+        (0.3, 0.4, [2.0], [2.0], True)]  # fmt: skip
+"""Held, on a ramp, held at another value, not looked at, and held at a third one."""
+
+
+def test_many_steps_in_one_call_are_the_steps_one_by_one(opened: Fmu) -> None:
+    rows = np.zeros((3, 3))
+    with Ramps.on(opened, ["thrust"], ramped=True) as ramps:
+        seen = ramps.craft.port("pose.x", "velocity.x", "thrust")
+        ramps.craft.start()
+        ramps.follow(LEGS, seen, [seen.over(row) for row in rows])
+    one_by_one = []
+    with Ramps.on(opened, ["thrust"], ramped=True) as ramps:
+        seen = ramps.craft.port("pose.x", "velocity.x", "thrust")
+        ramps.craft.start()
+        for *leg, kept in LEGS:
+            ramps.step(*leg)  # type: ignore[arg-type]
+            one_by_one += [seen.get()] if kept else []
+    assert rows.tolist() == one_by_one
+
+
+@pytest.mark.parametrize(
+    ("start", "says"),
+    [
+        ({"velocity.x": 1e200}, "must stay a finite number"),  # the step
+        ({"velocity.x": 1.3e308, "velocity.y": 1.3e308, "drag_coefficient": 0.0, "step_size": 0.1}, "^speed = inf"),
+    ],
+)
+def test_many_steps_in_one_call_end_where_one_is_refused_or_cannot_be_read(
+    start: dict[str, float], says: str, opened: Fmu
+) -> None:
+    with Ramps.on(opened, ["thrust"], ramped=False) as ramps:
+        seen = ramps.craft.port("speed")
+        ramps.craft.start(start)
+        with pytest.raises(SimulationError, match=says):
+            ramps.follow(LEGS[:1], seen, [seen.over(np.zeros(1))])
