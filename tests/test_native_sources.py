@@ -33,8 +33,10 @@ from tests.test_native_binaries import functions
 pytestmark = pytest.mark.once
 
 COMPILERS = ("gcc", "clang")
-OPTIMIZED = {("gcc", 2): "-O2", ("gcc", 3): "-O3", ("clang", 2): "-O3", ("clang", 3): "-O2"}
-"""By compiler and standard: most of both is the same C, and optimizing it takes ten times as long as compiling it."""
+OPTIMIZED = {2: "-O2", 3: "-O3"}
+"""By standard: most of both is the same C, and to optimize it takes ten times as long as to compile it. By gcc alone:
+some of its warnings come of that; clang's do not, and what it makes without libm are the package's own libraries.
+"""
 
 
 @pytest.fixture(scope="module")
@@ -86,13 +88,12 @@ def test_options_come_with_the_compiler_that_takes_them(folder: Path) -> None:
     assert [node.get("compilerOptions") is not None for node in sets] == [False, True]
 
 
-@pytest.mark.parametrize("optimized", [False, True])
-@pytest.mark.parametrize("name", COMPILERS)
+@pytest.mark.parametrize(("name", "optimized"), [("gcc", False), ("gcc", True), ("clang", False)])
 def test_it_compiles_without_a_warning_or_an_option_and_needs_no_libm(
     name: str, optimized: bool, folder: Path, flavour: Flavour
 ) -> None:
     """A tool's own build knows neither our options nor -lm; the library must load all the same."""
-    level = OPTIMIZED[name, flavour.fmi] if optimized else "-O0"
+    level = OPTIMIZED[flavour.fmi] if optimized else "-O0"
     command = [compiler_named(name), level, *headers(flavour.fmi), "-shared", "-fPIC", "-Wl,-z,defs"]
     command += ["-Wall", "-Wextra", "-Wpedantic", "-Werror"]
     command += [f"-DFMI{flavour.fmi}_OVERRIDE_FUNCTION_PREFIX", flavour.unit, "-o", "x.so"]

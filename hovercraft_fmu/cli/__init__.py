@@ -24,7 +24,7 @@ EXPECTED = (ValueError, OSError, ArithmeticError, ModuleNotFoundError)
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command and leave the process: status 0; 1 after a line for each thing that is wrong, 2 where it is in
-    how the command was used; 130 where it was stopped."""
+    how the command was used; 130 where it was stopped by Ctrl-C, 143 where it was asked to end."""
     begun = perf_counter()
     try:
         status = commands.main(arguments, prog_name="hovercraft-fmu", standalone_mode=False)
