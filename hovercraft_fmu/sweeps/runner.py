@@ -124,7 +124,7 @@ def _made(there: Store, job: Job, part: Part, make: Callable[..., Generator[Made
         return sum(map(job.count, chunks))
 
     mine = range(part.k - 1, job.chunks, part.n)
-    runs, had = count(mine), count(there.done)
+    runs, had = count(mine), count(chunk for chunk in there.done if chunk in mine)
     new = failed = warned = 0
     first: tuple[int, str] | None = None
     tell(had)
