@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 import threading
+from ctypes import CDLL, addressof, byref, c_double, c_void_p
 from dataclasses import astuple, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from hovercraft_fmu import advance_fleet
 from hovercraft_fmu.examples import cloud
 from hovercraft_fmu.fmu.machine_code import C_FOLDER, FLEET, Library, NotCompiledError
-from hovercraft_fmu.host.fleet import Crafts, _library, observe_fleet
+from hovercraft_fmu.host.fleet import Crafts, _CFleet, _CReached, _library, _Way, observe_fleet
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import ADAPTIVE, INTEGRATORS
@@ -133,6 +134,81 @@ def test_neighbours_change_nothing(method: str) -> None:
     assert str(mixed.refused[11]) == "heading = nan: must be a finite number"
     assert "must stay a finite number" in str(mixed.refused[3])
     assert mixed.states[3, 3] == 1e200
+
+
+@pytest.mark.parametrize("method", ["semi_implicit_euler", "rk4"])
+def test_a_block_that_is_not_finite_ends_at_once(method: str) -> None:
+    """Of 10^9 sub-steps, which would take half a minute, the first 65 536; but not where a neighbour goes on."""
+    hot, way = Craft(mass=1e-3, inertia=1e-3, air_density=1000.0), Settings(1.0, METHODS[method])
+    assert list(advance_fleet(State(vx=1e3), Controls(0.0), hot, 1e9, way).refused) == [0]
+    both = advance_fleet(columns([State(vx=1e3), State(vx=0.3)]), Controls(0.0), [hot, Craft()], 1e5, way)
+    assert list(both.refused) == [0]
+    alone = advance_fleet(State(vx=0.3), Controls(0.0), Craft(), 1e5, way)
+    assert tuple(both.states[:, 1]) == tuple(alone.states[:, 0])
+
+
+def test_a_ramp_beside_controls_that_hold() -> None:
+    """They do not go side by side, and have the bits that they have alone."""
+    ramps = [0.7, 0.0]
+    slopes = columns([Controls(ramp) for ramp in ramps])
+    both = advance_fleet(columns([State()] * 2), Controls(5.0), Craft(), 0.5, slopes=slopes)
+    for i, ramp in enumerate(ramps):
+        alone = advance_fleet(State(), Controls(5.0), Craft(), 0.5, slopes=Controls(ramp))
+        assert tuple(both.states[:, i]) == tuple(alone.states[:, 0])
+
+
+def test_the_entry_in_c_refuses_what_is_missing() -> None:
+    """-1, whichever array or structure is not there; a craft with a number that cannot be is refused alone."""
+    library: Any = CDLL(_library()._name)  # which takes any pointer
+    ones, found = (c_double * 1)(1.0), (c_double * 64)()
+    fleet, way, reached = _CFleet(count=1), _Way(integrator=1), _CReached()
+    constants = list(fleet.constants)
+    numbers = [*fleet.states, *fleet.controls, *fleet.slopes, *constants]
+    for column in (*numbers, *way.numbers):
+        column.values = addressof(ones)
+    reached.states = (c_void_p * 6)(*[addressof(found)] * 6)
+    others = [field[0] for field in _CReached._fields_ if field[0] != "states"]
+    for name in others:
+        setattr(reached, name, addressof(found))
+    motion, loads = (c_void_p * 2)(*[addressof(found)] * 2), (c_void_p * 4)(*[addressof(found)] * 4)
+
+    def entries() -> tuple[int, int, int]:
+        advanced = library.fleet_advance(byref(fleet), byref(way), byref(reached))
+        observed = library.fleet_observe(byref(fleet), motion, loads)
+        return advanced, observed, library.fleet_derived(byref(fleet), found)
+
+    assert entries() == (0, 0, 0)
+    for column in (*numbers, *way.numbers):
+        column.values = None
+        assert entries() == (-1, -any(column is each for each in numbers), -any(column is each for each in constants))
+        for number in (math.inf, -1.0):
+            bad = c_double(number)
+            column.values = addressof(bad)
+            cannot_be = number == math.inf or not any(column is each for each in numbers)
+            assert not cannot_be or entries()[0] == 1
+        column.values = addressof(ones)
+    for place in (reached.states, motion, loads):
+        for k, there in enumerate(place):
+            place[k] = None
+            assert -1 in entries()
+            place[k] = there
+    for name in others:
+        setattr(reached, name, None)
+        assert entries()[0] == -1
+        setattr(reached, name, addressof(found))
+    for way.integrator in (0, 6):
+        assert entries()[0] == -1
+    fleet.count = -1
+    assert entries() == (-1, -1, -1)
+    assert library.fleet_advance(None, byref(way), byref(reached)) == -1
+    assert library.fleet_advance(byref(fleet), byref(way), None) == -1
+    assert library.fleet_observe(None, motion, loads) == library.fleet_derived(None, found) == -1
+    fleet.count, way.integrator = 1, 1
+    assert library.fleet_advance(byref(fleet), None, byref(reached)) == -1
+    assert library.fleet_advance(byref(fleet), byref(way), None) == -1
+    assert library.fleet_observe(byref(fleet), None, loads) == library.fleet_observe(byref(fleet), motion, None) == -1
+    assert library.fleet_derived(byref(fleet), None) == -1
+    assert entries() == (0, 0, 0)
 
 
 def test_steps_and_tolerances_of_their_own() -> None:

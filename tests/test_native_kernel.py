@@ -1,9 +1,11 @@
 """The C kernel against the Python model: equal with this platform's libm, close with the sine and cosine that ship."""
 
+import itertools
 import math
 import random
-from ctypes import byref, c_double
+from ctypes import CDLL, byref, c_double
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -301,6 +303,23 @@ def test_a_run_that_is_not_finite_ends_at_once(libm: Kernel) -> None:
         outcome, made = libm.advance(State(vx=1e3), Controls(0.0), hot, 1e9, Settings(1.0, METHODS[method]))
         assert outcome == "not finite"
         assert math.isnan(made.state.vx)
+    pushed = Controls(0.0, external_force_x=1e308)
+    for craft in (Craft(drag_coefficient=0.0), Craft(drag_coefficient=0.0, skirt_friction=0.1)):
+        for method in METHODS.keys() - {"adaptive"}:
+            assert libm.advance(State(), pushed, craft, 1e9, Settings(1.0, METHODS[method]))[0] == "not finite"
+
+
+def test_the_arctangent_of_any_vector(tmp_path: Path) -> None:
+    """As libm's, within one unit in the last place and with its signs: zeros, infinities, no numbers, all quadrants."""
+    angle_of: Any = CDLL(str(compile_c(tmp_path / "angle.so", [c_file("arctangent.c")], *SHARED))).angle_of
+    angle_of.restype, angle_of.argtypes = c_double, (c_double, c_double)
+    sizes = [0.0, 5e-324, 1e-300, 1e-9, 0.4, 0.6, 1.0, 1.5, 2.5, 1e9, 1e300, math.inf]
+    numbers = [*sizes, *(-size for size in sizes)]
+    for y, x in itertools.product(numbers, numbers):
+        found, expected = angle_of(y, x), math.atan2(y, x)
+        assert abs(found - expected) <= math.ulp(expected), (y, x)
+        assert math.copysign(1.0, found) == math.copysign(1.0, expected), (y, x)
+    assert all(math.isnan(angle_of(*pair)) for pair in ((math.nan, 1.0), (1.0, math.nan)))
 
 
 # ---- sine and cosine
