@@ -11,8 +11,10 @@ import pytest
 import s3fs
 
 from hovercraft_fmu import SimulationError
+from hovercraft_fmu.studies import cluster_costs
 from hovercraft_fmu.sweeps import load, place, runner, sweep
-from tests.clusters import Cluster, cluster
+from hovercraft_fmu.sweeps.chunks import SECONDS
+from tests.clusters import PATIENCE, Cluster, cluster
 from tests.object_store import FORBIDDEN, SLOW_DOWN, ObjectStore, every, object_store
 from tests.shell import Shell
 
@@ -239,3 +241,21 @@ def test_a_store_that_cannot_be_used_is_one_line(store: ObjectStore, bucket: str
     store.refuse = lambda method, _: FORBIDDEN if method == "PUT" else None
     assert "PermissionError: Forbidden" in shell.refused(*command, f"s3://{bucket}/study")
     assert "pip install gcsfs" in shell.refused(*command, "gs://bucket/study")
+
+
+@pytest.mark.once
+def test_what_a_chunk_costs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those who feed the workers: measured here with few, and one worker; no clock is asserted."""
+    for name, value in {"QUICK": (1,), "FEW": 2, "MANY": 42, "RUNS": 2}.items():
+        monkeypatch.setattr(cluster_costs, name, value)
+    monkeypatch.setattr(cluster_costs, "PATIENCE", PATIENCE)
+    done: list[float] = []
+    findings = cluster_costs.measure(True, done.append)
+    (row,) = findings.records["cluster"].to_dicts()
+    assert (row["workers"], done) == (1, [1.0])
+    spent = [row["starter_ms_a_chunk"], row["scheduler_ms_a_chunk"]]
+    assert max(spent) > 0.0
+    assert [row["starter_ms_a_second"], row["scheduler_ms_a_second"]] == pytest.approx(
+        [each / SECONDS for each in spent]
+    )
+    assert row["workers_fed"] == int(1e3 * SECONDS / max(spent))

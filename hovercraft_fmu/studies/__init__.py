@@ -29,7 +29,7 @@ MEASUREMENTS: Mapping[str, Measurement] = {
         "estimates", "what the FMU says of its error, beside it; what is advised for every scene", "2 minutes"
     ),
     "step-costs": Measurement("step_costs", "a sub-step, a host's calls: native, Python FMU, bare model", "1 minute"),
-    "cluster": Measurement("cluster_costs", "what a chunk costs who starts a sweep, and dask's scheduler", "5 minutes"),
+    "cluster": Measurement("cluster_costs", "what a chunk costs who starts a sweep, and dask's scheduler", "2 minutes"),
     "sweeps": Measurement("sweep_costs", "a run of a sweep, beside fmpy's own way", "12 minutes"),
 }
 
