@@ -379,6 +379,48 @@ def test_the_keyboard_reaches_everything(opened: Opened) -> None:
     assert made.evaluate("hovercraft.page.settings.step_size") == 0.002
 
 
+def test_each_key_does_what_the_help_says(opened: Opened) -> None:
+    """A pair of keys there and back, two that go round, a single step; a button by the space bar; what the window
+    cannot hear any more is let go."""
+    made = opened()
+    made.keyboard.press(" ")
+
+    def settings() -> dict[str, Any]:
+        found: dict[str, Any] = made.evaluate("hovercraft.page.settings")
+        return found
+
+    before = settings()
+    for there, back, name in (("]", "[", "step_size"), ("+", "-", "scale"), ("=", "-", "scale")):
+        made.keyboard.press(there)
+        assert settings()[name] > before[name]
+        made.keyboard.press(back)
+        assert settings() == before
+    for key, name, count in (("v", "view", 2), ("m", "integrator", len(INTEGRATORS))):
+        seen = [(made.keyboard.press(key), settings()[name])[1] for _ in range(count)]
+        assert len({*seen}) == count
+        assert seen[-1] == before[name]
+    steps = made.evaluate("hovercraft.page.flight.steps")
+    made.keyboard.press(".")
+    assert made.evaluate("hovercraft.page.flight.steps") == steps + 1
+    made.locator("#integrator").select_option("adaptive")
+    made.keyboard.press("Escape")
+    made.keyboard.press("]")
+    assert settings()["tolerance"] > before["tolerance"]
+    made.get_by_label("More thrust").focus()
+    made.keyboard.down("Space")
+    for _ in range(2):
+        made.keyboard.press(".")
+    assert made.evaluate("hovercraft.page.flight.inputs.thrust") > 0
+    made.keyboard.up("Space")
+    made.keyboard.press("Escape")
+    made.keyboard.down("ArrowLeft")
+    made.keyboard.press(".")
+    assert made.evaluate("hovercraft.page.flight.inputs.starboard_thruster") == 1
+    made.evaluate("dispatchEvent(new Event('blur'))")
+    made.keyboard.press(".")
+    assert made.evaluate("hovercraft.page.flight.inputs.starboard_thruster") == 0
+
+
 def test_an_fmu_with_start_values_of_its_own_has_them_on_its_page(opened: Opened, file: Path, tmp_path: Path) -> None:
     """The module and its description say the same, and the command names the file."""
     own = tmp_path / FILE
