@@ -26,7 +26,7 @@ class Exempt(NamedTuple):
 
     file: str
     text: str
-    """Of its line, or a part of it that no other line of the file has."""
+    """With which its line goes on where it is, as far as it takes to be the only one."""
     way: str
     why: str
 
@@ -72,12 +72,17 @@ def closing_lines(taken: Taken, exceptions: Sequence[Exempt], goal: Sequence[str
 
 def is_meant(exempt: Exempt, branch: Branch) -> bool:
     """Whether that branch is the one that is listed."""
-    return (exempt.file, exempt.way) == (branch.file, branch.way) and exempt.text in text(branch)
+    is_there = _line(branch)[max(branch.column - 1, 0) :].strip().startswith(exempt.text)
+    return (exempt.file, exempt.way) == (branch.file, branch.way) and is_there
 
 
 def text(branch: Branch) -> str:
     """Of its line."""
-    return (ROOT / branch.file).read_text(encoding="utf-8").splitlines()[branch.line - 1].strip()
+    return _line(branch).strip()
+
+
+def _line(branch: Branch) -> str:
+    return (ROOT / branch.file).read_text(encoding="utf-8").splitlines()[branch.line - 1]
 
 
 def at(branch: Branch) -> str:
