@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from hovercraft_fmu.fmu.machine_code import C_FOLDER, LIBRARY_OPTIONS, OPTIONS, PLATFORMS, c_file, caches, compiler
 from tests import fuzz
@@ -62,13 +63,15 @@ def test_the_same_bits_on_arm64(here: list[str], tmp_path: Path) -> None:
     assert hashes(tmp_path / "arm", compiler(PLATFORMS["aarch64-linux"]), *VECTORS, *LINUX, runner=runner) == here
 
 
-def test_the_same_bits_on_windows(here: list[str], tmp_path: Path) -> None:
+def test_the_same_bits_on_windows(here: list[str], tmp_path: Path, shared_folder: Path) -> None:
     wine = shutil.which("wine64") or shutil.which(WINE)
     if not wine:
         pytest.skip("no wine64: apt-get install wine64")
-    env = {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all", "DISPLAY": ""}
+    prefix = shared_folder / "wine"  # that of test_native_platforms.py: to make it takes longer than the run
+    env = {"WINEPREFIX": str(prefix), "WINEDEBUG": "-all", "DISPLAY": ""}
     command = compiler(PLATFORMS["x86_64-windows"])
-    assert hashes(tmp_path / "hash.exe", command, *VECTORS, *WINDOWS, runner=(wine,), **env) == here
+    with FileLock(f"{prefix}.lock"):
+        assert hashes(tmp_path / "hash.exe", command, *VECTORS, *WINDOWS, runner=(wine,), **env) == here
 
 
 def test_any_bytes_at_the_entry(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from hovercraft_fmu.fmu.interface import (
 )
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
-from hovercraft_fmu.model.integrators import INTEGRATORS, Integrator, integrator_number
+from hovercraft_fmu.model.integrators import integrator_number
 from hovercraft_fmu.model.observation import observe_action, observe_motion
 from hovercraft_fmu.model.subcycling import Settings, advance
 from hovercraft_fmu.scenes import SCENES
@@ -257,7 +257,7 @@ def test_all_flavours_refuse_a_step_whose_watched_values_overflow(name: str, bot
     ]
 
 
-@pytest.mark.parametrize("method", INTEGRATORS, ids=lambda method: method.name)
+@pytest.mark.parametrize("method", ["splitting", "adaptive"])
 @pytest.mark.parametrize(
     ("name", "value", "beside"),
     [
@@ -268,11 +268,11 @@ def test_all_flavours_refuse_a_step_whose_watched_values_overflow(name: str, bot
     ],
 )
 def test_all_flavours_name_an_input_that_no_step_helps(
-    name: str, value: float, beside: dict[str, float], method: Integrator, both: list[tuple[Any, list[str]]]
+    name: str, value: float, beside: dict[str, float], method: str, both: list[tuple[Any, list[str]]]
 ) -> None:
     """Drag at the speed that it drives the craft to is faster than 1e-12 s: to ask for shorter steps would be a lie."""
     for instance, _ in both:
-        instance.setInteger([reference("integrator")], [integrator_number(method.name)])
+        instance.setInteger([reference("integrator")], [integrator_number(method)])
         for each, number in (beside | {name: value}).items():
             instance.setReal([reference(each)], [number])
         start(instance)

@@ -3,6 +3,7 @@
 import runpy
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from click.testing import CliRunner
 from hovercraft_fmu import cli, libraries
 from hovercraft_fmu.building import PRODUCTS, build
 from hovercraft_fmu.fmu import machine_code
-from hovercraft_fmu.fmu.description import NATIVE, NATIVE3
+from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
 from hovercraft_fmu.fmu.machine_code import PLATFORMS, Library, NotCompiledError, c_file, compile_all, library
 from hovercraft_fmu.libraries import compile_libraries
 from tests.binaries import dylib
@@ -148,15 +149,15 @@ def test_a_compiler_that_is_left_out_or_another(
 
 
 @pytest.mark.once
-def test_the_command_writes_everything(tmp_path: Path, complete_native_fmu: Path, standard: int, fmu: Path) -> None:
+def test_the_command_writes_everything(tmp_path: Path, complete: Callable[[Flavour], Path], fmu: Path) -> None:
     done = CliRunner().invoke(cli.commands, ["build", "--output", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert {path.name for path in tmp_path.iterdir()} == {each.name for each in PRODUCTS.values()}
     for line, each in zip(done.output.splitlines(), PRODUCTS.values(), strict=True):
         assert line.startswith(f"{tmp_path / each.name}: ")
         assert line.endswith(each.purpose)
-    native = PRODUCTS["native" if standard == 2 else "native3"].name
-    assert (tmp_path / native).read_bytes() == complete_native_fmu.read_bytes()
+    assert (tmp_path / PRODUCTS["native"].name).read_bytes() == complete(NATIVE).read_bytes()
+    assert (tmp_path / PRODUCTS["native3"].name).read_bytes() == complete(NATIVE3).read_bytes()
     assert (tmp_path / fmu.name).read_bytes() == fmu.read_bytes()
 
 

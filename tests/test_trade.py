@@ -185,6 +185,7 @@ def quick(name: str, folder: Path) -> str:
 def test_the_quick_trade(tmp_path: Path, complete_native_fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is committed was written by the same command: of methods with a fixed step every count and error again."""
     monkeypatch.setattr(trade, "TIMED", {"rk4": (0.5,)})
+    monkeypatch.setattr("hovercraft_fmu.studies.owners.KEPT", 40)
     monkeypatch.setattr(model_exchange, "TOLERANCES", model_exchange.TOLERANCES[1::3])
     assert complete_native_fmu.exists()  # so there is machine code
     printed = quick("trade", tmp_path)

@@ -127,7 +127,7 @@ def order(found: pl.DataFrame, error_of: str) -> float:
 def measure(quick: bool, tell: Tell) -> Findings:
     """The errors of a stretch and the whole course; quick: fewer communication steps."""
     exact, off = continuous()
-    steps, whole = (STEPS[3:], WHOLE_STEPS[2:5]) if quick else (STEPS, WHOLE_STEPS)
+    steps, whole = (STEPS[3:], WHOLE_STEPS[2:4]) if quick else (STEPS, WHOLE_STEPS)
     found = errors(steps, exact, part(tell, 0.0, 0.2))
     course = courses(whole, part(tell, 0.2, 0.5))
     half = {error_of: error for error_of, step, error in found.iter_rows() if step == VOYAGE.communication_step}
