@@ -24,7 +24,7 @@ from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import holding, plan, run_fmu
 from tests.lowlevel import everything, one, put, reference, start, status_of_refusal
 from tests.native import IN_TURN, STEPS
-from tests.test_native import METHODS
+from tests.test_native import METHODS, one_missing
 
 OK, WARNING, ERROR = 0, 1, 3
 TERMS: dict[str, dict[str, float | str]] = {
@@ -294,9 +294,10 @@ def test_null_is_refused(name: str, exchanged: tuple[Any, list[str]]) -> None:
     assert _function(instance, name)(c_void_p(None), *rest) == ERROR
     if name == "fmi3FreeFMUState" or not any(isinstance(each, c_void_p) for each in rest):
         return
-    assert _function(instance, name)(c_void_p(instance.component), *rest) == ERROR
-    assert len(messages) == 1
-    assert messages[0].startswith((f"{name}: ", "value reference "))
+    for arguments in (rest, *one_missing(rest)):
+        assert _function(instance, name)(c_void_p(instance.component), *arguments) == ERROR
+        assert len(messages) == 1
+        assert messages.pop().startswith((f"{name}: ", "value reference "))
 
 
 EMPTY = ["Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean",
