@@ -32,6 +32,7 @@ MINDS: dict[str, dict[str, float]] = {
     "as it starts": {},
     "given gains": {"lookahead": 20.0, "velocity_gain": 20.0, "integral_time": 30.0, "heading_gain": 1.5,
                     "yaw_rate_gain": 10.0, "turn_rate": 0.1},
+    "the same waypoint twice": {"waypoint[2].x": DEMO_COURSE[0][0], "waypoint[2].y": DEMO_COURSE[0][1]},
     "reverse thrust, turns back": {**ON_ICE, "turn_back": 1},
     "keeps its station": {"keep_station": 1, "waypoint_count": 2, "acceptance_radius": 30.0},
     "nothing to steer with": {"steering_force": 0.0},
@@ -61,6 +62,8 @@ def voyage(fmu: Path, mind: dict[str, float], seed: int) -> Iterator[list[float]
             )
             step = chance.choice([0.1, 0.5, 2.0, 30.0])
             x, y, heading = x + vx * step, y + vy * step, heading + yaw_rate * step
+            if k == 140:  # where it would keep its station
+                x, y = DEMO_COURSE[1]
             motion.set([x, y, heading, vx, vy, yaw_rate])
             if k == 75:
                 pilot.set({"waypoint[5].x": 70.0, "waypoint[6].y": -20.0, "cruise_speed": 0.5})
@@ -77,6 +80,24 @@ def test_with_libm_it_has_the_bits_of_the_python_one(mind: str, with_libm: Path,
         assert ours == theirs
         seen |= {row[OUTPUTS.index("status")] for row in theirs}
     assert len(seen) > 1  # it went through more than one state of mind
+
+
+def test_a_leg_so_long_that_the_way_left_is_lost_in_rounding(with_libm: Path, autopilot: Path) -> None:
+    """14 m before the waypoint, on the line, 10^17 m from where it begins: straight on, whatever its digits say."""
+
+    def commands(fmu: Path) -> list[float]:
+        with Fmu(fmu, AUTOPILOT_MODEL.name) as opened, opened.instance() as pilot:
+            pilot.start({"pose.x": -1e17, "waypoint[1].x": 7.0, "waypoint[1].y": 0.0, "turn_back": 1,
+                         "acceptance_radius": 2.0})  # fmt: skip
+            pilot.set({"pose.x": -7.0})
+            pilot.step(0.0, 0.1)
+            return list(pilot.port(*OUTPUTS).get())
+
+    found = commands(with_libm)
+    assert found == commands(autopilot)
+    assert found[OUTPUTS.index("distance")] == 14.0
+    assert found[OUTPUTS.index("thrust")] > 0.0
+    assert found[OUTPUTS.index("port_thruster")] == found[OUTPUTS.index("starboard_thruster")] == 0.0
 
 
 @pytest.mark.parametrize("mind", MINDS)

@@ -52,8 +52,8 @@ def closing_lines(taken: Taken, exceptions: Sequence[Exempt], goal: Sequence[str
         for each in listed:
             same = [branch for branch in of_file if is_meant(each, branch)]
             lines.append(f"  listed: {each.text} ({each.way}): {each.why}")
-            if not same:
-                wrong.append(f"{file}: no branch is {each.text!r} ({each.way}), which is listed")
+            if len(same) != 1:
+                wrong.append(f"{file}: {len(same)} branches are {each.text!r} ({each.way}), listed: must be one")
             wrong += [f"{at(branch)}: is taken, and listed" for branch in same if of_file[branch]]
         missed = [branch for branch, was in of_file.items() if not was]
         if missed:

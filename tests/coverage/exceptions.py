@@ -2,4 +2,21 @@
 
 from tests.coverage.branches import Exempt
 
-EXCEPTIONS: tuple[Exempt, ...] = ()
+NATIVE = "hovercraft_fmu/fmu/native/"
+_OLD = "a processor, or a system, without AVX2: the code for it is taken by test_fleet_platforms.py"
+_LAST = "the last part of a state is told only where no other is no number, and then all are none: it keeps the index"
+_OF_C = (
+    Exempt(f"{NATIVE}fleet/fleet.c", "!__get_cpuid(1", "true", _OLD),
+    Exempt(f"{NATIVE}fleet/fleet.c", "!(c & system_saves)", "true", _OLD),
+    Exempt(f"{NATIVE}fleet/fleet.c", "!(c & avx)", "true", _OLD),
+    Exempt(f"{NATIVE}fleet/fleet.c", "(low & registers) == registers", "false", _OLD),
+    Exempt(f"{NATIVE}fleet/fleet.c", "__get_cpuid_count(7", "false", _OLD),
+    Exempt(f"{NATIVE}fleet/fleet.c", "(b & avx2)", "false", _OLD),
+    Exempt(f"{NATIVE}fleet/fleet.c", "k + 1 < FLEET_STATES", "false", _LAST),
+    Exempt(f"{NATIVE}hovercraft/hovercraft.c", "n + 1 < STATE_COUNT", "false", _LAST),
+    Exempt(f"{NATIVE}hovercraft/hovercraft.c", "settings->integrator == ADAPTIVE", "true",
+           "10^8 sub-steps take a minute; the kernel is stopped after a thousand in test_native_kernel.py"),
+    Exempt(f"{NATIVE}hovercraft/kernel.c", "i < NEWTON", "false",
+           "Newton's iteration rises to the root from below, and stops before: the bound is so that it ends for sure"),
+)  # fmt: skip
+EXCEPTIONS: tuple[Exempt, ...] = _OF_C
