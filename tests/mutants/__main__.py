@@ -18,7 +18,20 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from .judging import NONE, NOTICED, SURVIVED, TIMED_OUT, BeforeError, Known, Verdict, baseline, copied, enter, judge
+from .judging import (
+    NONE,
+    NOTICED,
+    SURVIVED,
+    TIMED_OUT,
+    BeforeError,
+    Known,
+    Verdict,
+    baseline,
+    compile_all,
+    copied,
+    enter,
+    judge,
+)
 from .mutations import Mutant, mutants
 
 if sys.version_info >= (3, 11):
@@ -93,6 +106,7 @@ def known_ones(parallel: int) -> int:
         run = Run(parallel, 60.0, Path(place) / "mutants.jsonl")
         known = Known({test: 1.0 for tests in only.values() for test in tests}, 60.0, None, run.path, only)
         copied(ROOT, Path(place) / "base")
+        _in_process(_prepared, Path(place) / "base")
         run.share([here[name] for name in only], run.trees(Path(place)), known)
         verdicts = run.kept()
     for name in only:
@@ -104,16 +118,17 @@ def known_ones(parallel: int) -> int:
     return int(bool(wrong))
 
 
-def renew(seed: int, noticed: int = 34, survived: int = 6) -> int:
-    """Write known.toml: the first of the sample that were noticed, and of survivors those that must survive."""
+def renew(seed: int) -> int:
+    """Write known.toml: 40 of the sample, at most six that survive for a reason, and the first that are noticed."""
     found = Run(1, 0.0).kept()
     drawn = [found[mutant.name] for mutant in drawing((), seed) if mutant.name in found]
-    killed = [each for each in drawn if each.verdict == NOTICED and "::" in each.by and each.seconds < 5.0][:noticed]
+    reasons = {each["mutant"] for each in _table(SURVIVORS, "survivor") if each["equivalent"]}
+    left = [each for each in drawn if each.name in reasons][:6]
+    killed = [each for each in drawn if each.verdict == NOTICED and "::" in each.by and each.seconds < 5.0]
+    killed = killed[: 40 - len(left)]
     tests = list(dict.fromkeys(each.by for each in killed))
-    reasons = _table(SURVIVORS, "survivor")
-    left = [each for each in drawn if each.name in [one["mutant"] for one in reasons]][:survived]
-    lines = [(each, [each.by]) for each in killed] + [(each, tests) for each in left]
-    fields = ({"mutant": each.name, "verdict": each.verdict, "by": by} for each, by in lines)
+    fields = [{"mutant": each.name, "verdict": NOTICED, "by": [each.by]} for each in killed]
+    fields += [{"mutant": each.name, "verdict": SURVIVED, "by": tests} for each in left]
     parts = ("".join(f"{key} = {json.dumps(value)}\n" for key, value in each.items()) for each in fields)
     KNOWN.write_text("\n".join(f"[[known]]\n{part}" for part in parts), encoding="utf-8")
     return print(f"{KNOWN.name}: {len(killed)} that are noticed, {len(left)} that survive") or 0
@@ -176,6 +191,7 @@ class Run:
         if found.get("key") != key:
             found = {"key": key, "costs": _in_process(_baseline, tree)}
             path.write_text(json.dumps(found))
+        _in_process(_prepared, tree)
         return Known(found["costs"], self.seconds, COVERAGE, self.path)
 
     def trees(self, place: Path) -> list[Path]:
@@ -225,6 +241,11 @@ def _baseline(tree: Path) -> dict[str, float]:
     return baseline(tree, lambda line: print(line, flush=True))
 
 
+def _prepared(tree: Path) -> None:
+    enter(tree)
+    compile_all(tree)
+
+
 def _in_process(work: Any, *given: Any) -> Any:
     """So that this process imports nothing of the project."""
     with get_context("fork").Pool(1) as pool:
@@ -244,7 +265,8 @@ def report(verdicts: Sequence[Verdict], seed: int) -> None:
         why = reasons.get(verdict.name) or verdict.by or "not judged"
         print(f"survivor: line {verdict.line} of {verdict.name}: {why}")
     drawn = len(verdicts) - counts[NONE]
-    equivalent = sum(verdict.name in reasons or verdict.by != "" for verdict in left)
+    same = {each["mutant"] for each in _table(SURVIVORS, "survivor") if each["equivalent"]}
+    equivalent = sum(verdict.name in same or verdict.by != "" for verdict in left)
     noticed = counts[NOTICED] + counts[TIMED_OUT]
     print(
         f"{drawn} mutants drawn with seed {seed} ({counts[NONE]} more are none: they do not compile, or are not in "

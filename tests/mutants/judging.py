@@ -39,10 +39,14 @@ LEFT_OUT = ("sweep", "trade", "loops", "examples", "play", "readme", "drive", "s
             "platforms", "native_binaries", "build", "attacks", "operator", "palette", "stopping", "tutorial", "hosts",
             "advice", "cross_check", "native_fuzz", "house", "coverage", "mutants")  # fmt: skip
 """Test files that judge nothing: studies, browsers, other platforms' machines, what is above the FMU."""
-OTHERS = ("autopilot", "every", "fleet", "guidance", "letter", "machine", "tether", "variants")
+ANEW = ("autopilot", "cli", "control_log", "door", "fleet", "guidance", "native_autopilot", "pages", "scenes",
+        "simulation", "solvers", "tether")  # fmt: skip
+"""Test files for what is imported anew alone: of C others say more."""
+THREADS = "test_the_study_is_held_against_scipy"
+"""A test that needs threads that a fork has not got."""
+OTHERS = (*("autopilot", "fleet", "guidance", "tether"), "every", "letter", "machine", "variants")
 """Test files that need machine code of other models, or of many craft."""
-NOT_OF_C = ("autopilot", "choices", "cli", "control_log", "craft", "door", "dynamics", "folding", "guidance",
-            "identity", "integrators", "interface", "machine_code", "pages", "scenes", "subcycling")  # fmt: skip
+NOT_OF_C = ("choices", "craft", "dynamics", "folding", "identity", "integrators", "interface", "subcycling")
 """Test files that run no native FMU, or of which other ones say more."""
 LIKELY = {
     "kernel.c": "native_kernel", "linearization.c": "partial_derivatives", "partials.c": "partial_derivatives",
@@ -60,8 +64,8 @@ FIRST = 40
 """Tests that are run one by one, the best first; the rest follows file by file."""
 TIME_LIMIT = 900.0
 """s, of all tests of a mutant; a test alone has ten times the CPU time it takes, and 4 s."""
-COMPILER = ("gcc", "-std=c11", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-g0", "-w", "-I.",
-            "-Werror=incompatible-pointer-types", "-Werror=int-conversion", "-fvisibility=hidden",
+COMPILER = (shutil.which("clang") or "gcc", "-std=c11", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-g0", "-w",
+            "-I.",            "-Werror=incompatible-pointer-types", "-Werror=int-conversion", "-fvisibility=hidden",
             "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")  # fmt: skip
 """Without optimization, which is where most of the time would go: the bits are the same."""
 
@@ -95,8 +99,8 @@ class BeforeError(Exception):
 
 def copied(root: Path, tree: Path) -> None:
     """All that tests need of the project."""
-    shutil.copytree(root / "tests", tree / "tests", ignore=shutil.ignore_patterns("__pycache__"))
-    ignored = shutil.ignore_patterns("__pycache__", "compiled")
+    shutil.copytree(root / "tests", tree / "tests")
+    ignored = shutil.ignore_patterns("compiled")
     shutil.copytree(root / "hovercraft_fmu", tree / "hovercraft_fmu", ignore=ignored)
     for path in root.iterdir():
         if path.is_file():
@@ -177,6 +181,14 @@ class Compilation:
         from hovercraft_fmu.libraries import libraries
 
         return [self.object(each, source, *options).read_bytes() for each in libraries()[:2] for source in each.sources]
+
+
+def compile_all(tree: Path) -> None:
+    """Of the tree as it is: its copies have it then."""
+    compilation = Compilation(tree)
+    compilation(True)
+    for options in STAGES:
+        compilation.units(*options)
 
 
 # ---- running tests
@@ -335,7 +347,10 @@ class Known:
         """Tests that show whether anything runs at all."""
         if self.only:
             return list(dict.fromkeys(test for tests in self.only.values() for test in tests))
-        return sorted((test for test in self.costs if not needs_others(test)), key=lambda test: self.costs[test])[:400]
+        return sorted(
+            (test for test in self.costs if not needs_others(test) and module(test)[5:] not in ANEW),
+            key=lambda test: self.costs[test],
+        )[:100]
 
     def ordered(self, mutant: Mutant, share: float = 1.0) -> list[str]:
         """Tests that may notice it, as many as its time, or a share of it, allows, the best first."""
@@ -344,15 +359,20 @@ class Known:
         is_c = not mutant.file.endswith(".py")
         likely = LIKELY.get(Path(mutant.file).name, "lifecycle").split()
         covering = set() if is_c else self.covering(mutant)
-        noticed = Counter[str]()
+        noticed, alike = Counter[str](), Counter[str]()
         for (file, test), times in self.kills.items():
-            noticed[test] += 5 * times if file == mutant.file else times if file[-2:] == mutant.file[-2:] else 0
+            weight = 5 * times if file == mutant.file else times if file[-2:] == mutant.file[-2:] else 0
+            noticed[test] += weight
+            alike[test.split("[")[0]] += weight
         worth = {}
         for test, cost in self.costs.items():
             name = module(test).removeprefix("test_")
-            if not is_c or not (name in NOT_OF_C or "[python" in test):
+            is_apt = (
+                name not in (*NOT_OF_C, *ANEW) and "[python" not in test if is_c else share == 1.0 or name not in ANEW
+            )
+            if is_apt and THREADS not in test:
                 sooner = 0.05 + 0.5 * (name in likely) + 1.0 * (test in covering)
-                worth[test] = (noticed[test] + sooner) / (cost + 0.03)
+                worth[test] = (noticed[test] + 0.1 * alike[test.split("[")[0]] + sooner) / (cost + 0.03)
         chosen, spent = [], 0.0
         for test in sorted(worth, key=lambda test: -worth[test]):
             spent += self.costs[test]
@@ -443,17 +463,27 @@ def judge(tree: Path, mutants: Iterator[Mutant], known: Known, record: Record) -
             chosen = [items[test] for test in order if test in items and needs_others(test) == others]
             return running.run(chosen, known.costs, told)
 
+        def is_sound(test: str) -> bool:
+            """Whether it passes, alone, where nothing is changed: asked when it is the first time that it noticed."""
+            if any(by == test for _, by in known.kills):
+                return True
+            return in_fork(lambda told: running.run([items[test]], known.costs, told))[0] == SURVIVED
+
         _require(in_fork(lambda told: run(known.cheapest(), False, told)))
         for mutant in mutants:
             known.learn()
-            verdict = (_exchanged if mutant.file.endswith(".py") else _compiled)(tree, mutant, known, compiled, run)
+            judged = _exchanged if mutant.file.endswith(".py") else _compiled
+            verdict = judged(tree, mutant, known, compiled, run)
+            while verdict and verdict.by in items and not is_sound(verdict.by):
+                del known.costs[verdict.by]
+                verdict = judged(tree, mutant, known, compiled, run)
             if verdict:
                 record(verdict)
             else:
                 waiting.append(mutant)
         left.write_bytes(pickle.dumps(waiting))
 
-    files = sorted({module(test) for test in known.cheapest()}) if known.only else test_files(tree)
+    files = sorted(name for name in {module(test) for test in known.costs} if name.removeprefix("test_") not in ANEW)
     _require(in_fork(lambda _: run_pytest(tree, files, serve) == 0 and left.exists(), 1e9))
     waiting = pickle.loads(left.read_bytes())
     left.unlink()
@@ -490,7 +520,7 @@ def _exchanged(tree: Path, mutant: Mutant, known: Known, compiled: Compilation, 
             function.__code__ = codes[function.__code__]
         print("compiling", file=told, flush=True)
         compiled(False)
-        return run(known.ordered(mutant, 0.3), False, told)
+        return run(known.ordered(mutant, 0.15), False, told)
 
     with change:
         outcome, by, spent = in_fork(work)
