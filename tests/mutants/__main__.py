@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from collections import Counter
@@ -60,6 +61,7 @@ def main() -> int:
     parser.add_argument("--known", action="store_true", help="judge those of known.toml, each by the test named there")
     parser.add_argument("--renew", action="store_true", help="make known.toml of what was found")
     given = parser.parse_args()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that its trees are removed
     try:
         if given.known or given.renew:
             return known_ones(given.parallel) if given.known else renew(given.seed)
@@ -224,6 +226,8 @@ class Run:
                     return
                 yield mutants[at]
 
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this one ends it
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         enter(tree)
         try:
             judge(tree, taken(), known, self.record)
