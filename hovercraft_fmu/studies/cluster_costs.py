@@ -24,7 +24,7 @@ WORKERS, QUICK = (2, 4, 8, 16), (2,)
 """Processes, of one thread each."""
 FEW, MANY = 50, 450
 """Chunks of two sweeps: what they differ by is what chunks cost, without what a sweep costs once."""
-RUNS = 40
+RUNS = 3000
 """Of a chunk: some 50 ms of work, so that a measurement has many; what feeding it costs does not depend on them."""
 PATIENCE = 60.0
 """s, for a scheduler and its workers to begin."""
@@ -60,7 +60,7 @@ def _spent(address: str, scheduler: psutil.Process, chunks: int) -> NDArray[np.f
         "set": {"integrator": "rk4", "step_size": 0.1},
         "sweep": {"mass": {"from": 80.0, "to": 120.0}, "air_density": {"from": 1.0, "to": 1.3}},
         "sampling": {"method": "latin_hypercube", "runs": RUNS * chunks, "seed": 1},
-        "keep": {"distance": True},
+        "keep": {"end": ["speed"]},
     }
     with temporary_folder() as output, patch.dict(runner.LEAST_CHUNKS, {runner.BATCH: chunks}):
         before = _clocks(scheduler)

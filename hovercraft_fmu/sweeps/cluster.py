@@ -5,6 +5,7 @@ import ssl
 from collections.abc import Generator
 from itertools import islice
 from pathlib import Path
+from time import sleep
 from typing import Any, NamedTuple
 
 import distributed
@@ -21,6 +22,8 @@ CONNECT = 10
 """s, to reach a scheduler, and for its first worker to be there."""
 AHEAD = 2
 """Chunks a worker that are on their way: memory here and there stays bounded."""
+PAUSE = 0.1
+"""s, in which chunks gather: the more are handled at once, the less each takes. Workers have the next one meanwhile."""
 
 
 class Scheduler(NamedTuple):
@@ -97,9 +100,10 @@ def _on(client: Any, job: Job, todo: Todo) -> Generator[Made, None, None]:
 
     waiting = distributed.as_completed(submitted(AHEAD * sum(client.nthreads().values())), loop=client.loop)
     try:
-        for finished in waiting.batches():  # the more there are, the less each of them takes
+        for finished in waiting.batches():
             waiting.update(submitted(len(finished)))
             yield from client.gather(finished)
+            sleep(PAUSE)
     except distributed.KilledWorker as error:
         raise SimulationError(f"the workers are gone: {error}") from error
     except distributed.client.FutureCancelledError as error:
