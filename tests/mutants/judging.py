@@ -13,7 +13,6 @@ import inspect
 import json
 import os
 import pickle
-import resource
 import select
 import shutil
 import signal
@@ -284,6 +283,8 @@ def in_fork(work: Callable[[IO[str]], bool], limit: float = TIME_LIMIT) -> tuple
 
 
 def _alone(work: Callable[[IO[str]], bool], write: int) -> None:
+    import resource  # Windows has none; the rest of this file is read there, too
+
     code = 1
     try:
         os.setsid()
