@@ -9,6 +9,7 @@ from fmpy.fmi1 import FMICallException
 
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, VARIABLES
 from hovercraft_fmu.host import Fmu, Instance
+from tests.blobs import BUILD, with_word
 
 REALS = [v for v in VARIABLES if v.kind == "Real"]
 INTEGERS = [v for v in VARIABLES if v.kind != "Real"]
@@ -181,3 +182,20 @@ def kept(instance: Any, through_bytes: bool) -> Any:
     content = instance.serializeFMUstate(state)
     instance.freeFMUstate(state)
     return instance.deSerializeFMUstate(content)
+
+
+def with_any_other_word(instance: Any) -> None:
+    """Of its state, signed anew: what is taken is written as it was taken, and some is refused."""
+    content, outcomes = bytes(instance.serializeFMUstate(instance.getFMUstate())), set()
+    for offset in range(BUILD.stop, len(content) - 8, 4):
+        for word in (0x7FF00000, 0xFFFFFFFF):
+            try:
+                state = instance.deSerializeFMUstate(with_word(content, offset, word))
+            except FMICallException:
+                outcomes.add("refused")
+                continue
+            outcomes.add("taken")
+            once = bytes(instance.serializeFMUstate(state))
+            assert bytes(instance.serializeFMUstate(instance.deSerializeFMUstate(once))) == once
+            instance.freeFMUstate(state)
+    assert outcomes == {"refused", "taken"}

@@ -30,7 +30,19 @@ from hovercraft_fmu.host import read_description
 from hovercraft_fmu.simulation import holding, plan, run_fmu, run_model
 from tests.blobs import signed, with_word
 from tests.conftest import FMI_2, ROOT, Built
-from tests.lowlevel import Instance3, count, everything, get, named, one, put, reference, start, worded
+from tests.lowlevel import (
+    Instance3,
+    count,
+    everything,
+    get,
+    named,
+    one,
+    put,
+    reference,
+    start,
+    with_any_other_word,
+    worded,
+)
 from tests.native import IN_TURN, STEPS, c_compiler
 from tests.test_native_platforms import SANITIZERS
 
@@ -379,6 +391,12 @@ CALLS = {
 ONLY_AN_INSTANCE = ("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2Reset",
                     "fmi2CancelStep", "fmi2FreeFMUstate", "fmi2EnterEventMode",
                     "fmi2EnterContinuousTimeMode", "fmi2GetEventIndicators")  # fmt: skip
+
+
+def test_a_state_with_any_other_word_is_refused_or_is_what_it_says(instance: Any) -> None:
+    """Whoever can work out a checksum may write numbers that cannot be."""
+    start(instance)
+    with_any_other_word(instance)
 
 
 def one_missing(arguments: list[Any]) -> Iterator[list[Any]]:
