@@ -72,6 +72,10 @@ def test_a_number_does_what_the_item_does(each_fmu: Path, by_item: list[list[flo
             {"drag_area": DIRECTIONAL, "drag_area_number": 1},
             "drag_area = 2 and drag_area_number = 1: must be the same where both are set",
         ),
+        (
+            {"error_estimate": ON, "error_estimate_number": 1},
+            "error_estimate = 2 and error_estimate_number = 1: must be the same where both are set",
+        ),
     ],
 )
 def test_two_that_differ_are_refused(each_fmu: Path, choices: dict[str, int], message: str) -> None:

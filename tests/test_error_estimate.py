@@ -235,6 +235,16 @@ def test_an_estimate_that_is_lost_says_so_once(each_fmu: Path) -> None:
         assert said[0].endswith(": cannot be trusted; set a smaller step_size (said once)")
 
 
+def test_of_the_adaptive_method_it_is_the_tolerance_that_is_too_large(each_fmu: Path) -> None:
+    """100 m: its steps are longer than drag lets any be that are to be stable."""
+    with one(each_fmu) as (instance, messages):
+        begin(instance, "adaptive", step_size=10.0, tolerance=100.0, thrust=5.0, velocity__x=10.0,
+              velocity__yaw_rate=0.5)  # fmt: skip
+        instance.doStep(0.0, 10.0)
+        assert count(instance, "warnings") & ERROR_LOST
+        assert messages[-1].endswith(": cannot be trusted; set a smaller tolerance (said once)")
+
+
 def test_a_stop_within_a_few_substeps_cannot_be_trusted(each_fmu: Path) -> None:
     """Slower than friction takes away in a sub-step, craft and companion stop at once, each where it was: no
     difference, and off by v0^2/(2*mu*g). A stop after many sub-steps can be trusted, and so can a launch.

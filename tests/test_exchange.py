@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from hovercraft_fmu.model.dynamics import (
     derivatives,
 )
 from hovercraft_fmu.model.observation import observe_action, observe_motion
+from tests.blobs import SUBSTEPS, with_word
 from tests.conftest import FMI_2
 from tests.exchange import (
     EVERYWHERE,
@@ -35,6 +37,7 @@ from tests.exchange import (
 )
 from tests.lowlevel import (
     CONTINUOUS,
+    INTEGERS,
     Instance3,
     count,
     everything,
@@ -45,6 +48,7 @@ from tests.lowlevel import (
     reference,
     start,
     status_of_refusal,
+    with_any_other_word,
     worded,
 )
 from tests.strategies import crafts, numbers
@@ -438,6 +442,43 @@ def test_a_state_of_the_other_use_is_refused(instance: Any, messages: list[str],
     assert everything(instance) == before
     with pytest.raises(FMICallException):
         stepped.setFMUstate(stepped.deSerializeFMUstate(instance.serializeFMUstate(instance.getFMUstate())))
+
+
+def test_a_state_with_any_other_word_is_refused_or_is_what_it_says(instance: Any) -> None:
+    """None has friction, or an error estimate."""
+    go(instance)
+    with_any_other_word(instance)
+
+
+PHASE = SUBSTEPS + 4 * len(INTEGERS) + 4
+"""Where a state has it: behind the integers, and the use."""
+
+
+def test_a_forged_phase_is_one_of_its_use(instance: Any, stepped: Any) -> None:
+    """By their numbers: instantiated, initialization mode, step mode, terminated, event mode, continuous-time mode."""
+    for each, possible in ((instance, {0, 1, 3, 4, 5}), (stepped, {0, 1, 2, 3})):
+        each.reset()
+        start(each)
+        content = bytes(each.serializeFMUstate(each.getFMUstate()))
+        taken = set()
+        for phase in range(-1, 9):
+            with suppress(FMICallException):
+                each.freeFMUstate(each.deSerializeFMUstate(with_word(content, PHASE, phase % 2**32)))
+                taken.add(phase)
+        assert taken == possible
+
+
+def test_a_forged_state_whose_parameters_contradict_one_another_goes_nowhere(
+    instance: Any, messages: list[str]
+) -> None:
+    """In continuous-time mode, where no host could have set them."""
+    to_phase(instance, "event mode")
+    put(instance, thrust_min=20.0)
+    content = bytes(instance.serializeFMUstate(instance.getFMUstate()))
+    instance.setFMUstate(instance.deSerializeFMUstate(with_word(content, PHASE, 5)))
+    with pytest.raises(FMICallException):
+        instance.completedIntegratorStep()
+    assert messages == ["thrust_min = 20.0 N: must not be above thrust_max = 10.0 N"]
 
 
 # ---- the description

@@ -5,7 +5,7 @@ What it shares with FMI 2.0 is in test_lifecycle.py, test_native.py, test_exchan
 import math
 import zipfile
 from collections.abc import Callable, Iterator
-from ctypes import CDLL, byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import CDLL, byref, c_bool, c_char_p, c_double, c_float, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +129,10 @@ BAD_LISTS: dict[str, tuple[Callable[[Any], object], str]] = {
     "too many values": (
         lambda i: i.getFloat64([3], nValues=2),
         "fmi3GetFloat64: nValues = 2: must be 1, a value for each of the scalars",
+    ),
+    "two values for one of no type": (
+        lambda i: i.fmi3GetFloat32(i.component, (c_uint * 1)(0), 1, (c_float * 2)(), 2),
+        "fmi3GetFloat32: nValues = 2: must be 1, a value for each of the scalars",
     ),
     "an enumeration as Int32": (
         lambda i: i.getInt32([reference("integrator")]),
@@ -366,7 +370,11 @@ INSTANTIATE = "fmi3InstantiateCoSimulation"
     ("token", "options", "message"),
     [
         ("{%s%n\xff}", {}, "instantiationToken = '{{?s?n??}}': must be '{token}', as in modelDescription.xml"),
-        (None, {"eventModeUsed": True}, f"{INSTANTIATE}: eventModeUsed must be false: hasEventMode is false"),
+        (
+            None,
+            {"eventModeUsed": True, "requiredIntermediateVariables": [0]},
+            f"{INSTANTIATE}: eventModeUsed must be false: hasEventMode is false",
+        ),
         (
             None,
             {"requiredIntermediateVariables": [0, reference("speed")]},
@@ -391,9 +399,13 @@ def test_no_scheduled_execution_and_no_null_token(slave: fmi3.FMU3Slave) -> None
     library.fmi3InstantiateScheduledExecution.restype = library.fmi3InstantiateModelExchange.restype = c_void_p
     common = (c_char_p(b"a"), c_char_p(slave.guid.encode()), None, c_bool(False), c_bool(False), None, callback)
     assert library.fmi3InstantiateScheduledExecution(*common, None, None, None) is None
+    library.fmi3InstantiateCoSimulation.restype = c_void_p
+    asked = (c_bool(False), c_bool(False), None, c_size_t(1), None, callback, None)  # for one of a list of none
+    assert library.fmi3InstantiateCoSimulation(*common[:5], *asked) is None
     assert library.fmi3InstantiateModelExchange(common[0], None, *common[2:]) is None
     assert [message.partition(":")[0] for _, _, message in logger.said] == [
         "fmi3InstantiateScheduledExecution",
+        INSTANTIATE,
         "instantiationToken = 'NULL'",
     ]
     made = library.fmi3InstantiateModelExchange(None, *common[1:6], None)  # neither name nor logger

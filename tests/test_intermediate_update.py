@@ -176,6 +176,18 @@ def test_a_refused_value_refuses_the_step_and_nothing_is_lost(opened: Fmu) -> No
             craft.forget(state)
 
 
+def test_a_step_that_was_discarded_may_be_tried_again_as_it_was(opened: Fmu) -> None:
+    """The host may answer otherwise."""
+    force = [1e308]
+    with opened.instance(intermediate=Intermediate(["external.force.x"], lambda _: force)) as craft:
+        craft.start()
+        for _ in range(2):
+            with pytest.raises(SimulationError, match="must not drive the craft so fast"):
+                craft.step(0.0, STEP)
+        force[0] = 0.0
+        craft.step(0.0, STEP)
+
+
 def test_what_the_host_raises_the_step_raises(opened: Fmu) -> None:
     def values(time: float) -> Sequence[float]:
         raise LookupError(f"nothing is known of {time} s")

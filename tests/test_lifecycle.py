@@ -229,20 +229,24 @@ def test_all_flavours_refuse_a_craft_out_of_range_in_the_same_words(
     assert message in said[0]
 
 
-WATCHED_OUT_OF_RANGE: dict[str, dict[str, float]] = {
-    "stability_number": {"mass": 1e-300, "inertia": 1e-300, "air_density": 1e10, "velocity.yaw_rate": 1.0},
-    "rotation_per_substep": {"step_size": 1e300, "air_density": 1e-100, "velocity.yaw_rate": 1e100,
-                             "mass": 1e-300, "inertia": 5e-300, "rotational_drag": 1.0},
-}  # fmt: skip
-"""Where drag_implicit, which never diverges, leaves the motion finite."""
+WATCHED_OUT_OF_RANGE: tuple[tuple[str, int, dict[str, float]], ...] = (
+    ("stability_number", 2, {"mass": 1e-300, "inertia": 1e-300, "air_density": 1e10, "velocity.yaw_rate": 1.0}),
+    ("rotation_per_substep", 2, {"step_size": 1e300, "air_density": 1e-100, "velocity.yaw_rate": 1e100,
+                                 "mass": 1e-300, "inertia": 5e-300, "rotational_drag": 1.0}),
+    ("rotation_per_substep", 5, {"step_size": 2.0, "drag_coefficient": 0.0, "pose.heading": -1.5e308,
+                                 "velocity.yaw_rate": 1e308}),
+)  # fmt: skip
+"""Where drag_implicit, which never diverges, leaves the motion finite; and splitting, which turns by halves."""
 
 
-@pytest.mark.parametrize("name", WATCHED_OUT_OF_RANGE)
-def test_all_flavours_refuse_a_step_whose_watched_values_overflow(name: str, both: list[tuple[Any, list[str]]]) -> None:
-    values = {key.replace(".", "__"): value for key, value in WATCHED_OUT_OF_RANGE[name].items()}
+@pytest.mark.parametrize(("name", "method", "given"), WATCHED_OUT_OF_RANGE)
+def test_all_flavours_refuse_a_step_whose_watched_values_overflow(
+    name: str, method: int, given: dict[str, float], both: list[tuple[Any, list[str]]]
+) -> None:
+    values = {key.replace(".", "__"): value for key, value in given.items()}
     step = values.get("step_size", 0.001)
     for instance, _ in both:
-        instance.setInteger([reference("integrator")], [2])
+        instance.setInteger([reference("integrator")], [method])
         put(instance, **values)
         start(instance)
         before = get(instance, *STATES)
@@ -415,6 +419,9 @@ def test_the_counter_of_substeps_stops_at_its_end(instance: Any, messages: list[
     assert (count(instance), count(instance, "warnings")) == (SUBSTEPS_MAX, 0)
     instance.doStep(0.05, 0.05)
     assert (count(instance), count(instance, "warnings")) == (SUBSTEPS_MAX, COUNTER_STOPPED)
+    instance.doStep(0.1, 0.05)
+    assert (count(instance), count(instance, "warnings")) == (SUBSTEPS_MAX, COUNTER_STOPPED)
+    assert len(messages) == 1  # said once
     assert "substeps = 2147483647" in messages[-1]
 
 

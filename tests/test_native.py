@@ -28,7 +28,7 @@ from hovercraft_fmu.fmu.machine_code import C_FOLDER
 from hovercraft_fmu.fmu.native_package import binary
 from hovercraft_fmu.host import read_description
 from hovercraft_fmu.simulation import holding, plan, run_fmu, run_model
-from tests.blobs import signed, with_word
+from tests.blobs import MAGIC, signed, with_word
 from tests.conftest import FMI_2, ROOT, Built
 from tests.lowlevel import (
     Instance3,
@@ -224,6 +224,15 @@ def test_faults_of_derivatives(name: str, instance: Any, messages: list[str]) ->
 
 
 @FMI_2
+def test_no_ramp_begins_after_the_end(instance: Any, messages: list[str]) -> None:
+    start(instance)
+    instance.terminate()
+    with pytest.raises(FMICallException):
+        ramp(instance, thrust=1.0)
+    assert messages == ["thrust = 1.0: must not be set in state 'terminated' (continuous input)"]
+
+
+@FMI_2
 def test_a_ramp_without_end_is_refused_by_the_step(instance: Any, messages: list[str]) -> None:
     start(instance)
     ramp(instance, thrust=1.7e308)
@@ -273,6 +282,21 @@ def test_an_output_derivative_that_is_no_number_is_refused(instance: Any, messag
     with pytest.raises(FMICallException):
         derivatives(instance)
     assert messages == ["derivative of body.surge = inf: must be a finite number; the motion is out of range"]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [({"velocity__x": 1e200}, "speed = inf: "), ({"velocity__x": 1e100, "air_density": 1e200}, "force.x = -inf: ")],
+)
+def test_what_is_out_of_range_has_no_derivative_and_is_not_read(
+    values: dict[str, float], message: str, instance: Any, messages: list[str]
+) -> None:
+    start(instance, **values)
+    calls: tuple[Callable[[], object], ...] = (lambda: derivatives(instance), lambda: get(instance, "force.x"))
+    for call in calls:
+        with pytest.raises(FMICallException):
+            call()
+        assert messages.pop() == message + "must be a finite number; the motion is out of range"
 
 
 # ---- status
@@ -473,6 +497,13 @@ def test_a_forged_state_cannot_break_the_instance(offset: int, word: int, shared
             call()
     instance.reset()
     start(instance)
+
+
+def test_a_state_of_another_layout_is_refused(instance: Any, messages: list[str]) -> None:
+    content = bytes(instance.serializeFMUstate(instance.getFMUstate()))
+    with pytest.raises(FMICallException):
+        instance.deSerializeFMUstate(with_word(content, len(MAGIC), 6))
+    assert "must be a state of this build" in messages[-1]
 
 
 @pytest.mark.parametrize("step_size", [-1e-300, -1.0, 0.0, math.nan])

@@ -182,6 +182,8 @@ FAULTS: dict[str, tuple[Callable[[Instance], object], str]] = {
     "a choice of none": (lambda i: i.set({"keep_station": 2}), "keep_station = 2: must be 0 or 1"),
     "no waypoints": (lambda i: i.set({"waypoint_count": 0}), "waypoint_count = 0: must be from 1 to 32"),
     "an output": (lambda i: i.set({"thrust": 1.0}), "thrust = 1.0: must not be set in state"),
+    "arrived": (lambda i: i.set({"arrived": 1}), "arrived = True: must not be set in state"),
+    "not arrived": (lambda i: i.set({"arrived": 0}), "arrived = False: must not be set in state"),
     "a counter": (lambda i: i.set({"waypoint": 1}), "waypoint = 1: must not be set in state"),
     "step back": (lambda i: i.step(0.0, 1.0), "currentCommunicationPoint = 0.0 s: must be where the last step ended"),
     "step nan": (lambda i: i.step(1.0, math.nan), "communicationStepSize = nan s: must be"),
@@ -207,6 +209,41 @@ def test_a_fault_is_loud_in_the_same_words_and_loses_nothing(name: str, each_aut
         with pytest.raises(SimulationError, match=re.escape(words)):
             fault(pilot)
         assert list(outputs.get()) == before
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"steering_force": 1e308, "inertia": 1e-300}, "frequency = inf rad/s of the heading's loop: must be"),
+        ({"pose.x": 1.7e308, "waypoint[1].x": -1.7e308}, "must be a finite number; the motion is out of range"),
+    ],
+)
+def test_what_is_out_of_range_from_the_beginning_does_not_start(
+    values: dict[str, float], words: str, each_native_autopilot: Path
+) -> None:
+    """Nor can be read what would follow from it."""
+    with one(each_native_autopilot) as (pilot, messages):
+        references = {v.name: v.reference for v in AUTOPILOT_MODEL.variables}
+        pilot.setReal([references[name] for name in values], list(values.values()))
+        pilot.setupExperiment()
+        pilot.enterInitializationMode()
+        calls: tuple[Callable[[], object], ...] = (
+            lambda: pilot.getInteger([references["waypoint"]]),
+            lambda: pilot.getBoolean([references["arrived"]]),
+            pilot.exitInitializationMode,
+        )
+        for call in calls:
+            with pytest.raises(FMICallException):
+                call()
+            assert words in messages.pop()
+
+
+def test_once_arrived_it_asks_for_nothing(each_autopilot: Path) -> None:
+    with Fmu(each_autopilot, AUTOPILOT_MODEL.name) as opened, opened.instance() as pilot:
+        pilot.start({"waypoint_count": 1, "acceptance_radius": 1e3})
+        pilot.set({"velocity.x": 2.0, "pose.heading": 0.5})
+        pilot.step(0.0, 1.0)
+        assert pilot.port("arrived", "thrust", "port_thruster", "starboard_thruster").get() == [1, 0.0, 0.0, 0.0]
 
 
 def test_a_state_goes_back_and_that_of_another_model_is_refused(

@@ -3,6 +3,7 @@
 import itertools
 import math
 import random
+import sys
 from ctypes import CDLL, byref, c_double
 from pathlib import Path
 from typing import Any
@@ -194,6 +195,9 @@ EXTREMES = {
     "the end of the world": (State(x=1.7e308, y=1.7e308), Craft(), 0.1),
     "a spin too fast to follow": (State(yaw_rate=1e13), Craft(drag_coefficient=0.0), 0.1),
     "turned beyond all numbers": (State(), Craft(inertia=1e-300, drag_center_fraction=0.0), 0.1),
+    "turned beyond all numbers, from rest on ground that rubs": (
+        State(heading=sys.float_info.max), Craft(skirt_friction=0.01, drag_coefficient=0.0), 0.1,
+    ),
     "masses whose product is no number": (
         State(vx=1.0, yaw_rate=1.0), Craft(mass=1e-200, inertia=1e-200, drag_coefficient=0.0), 0.01,
     ),
@@ -212,6 +216,31 @@ def test_extremes_end_in_the_same_way(name: str, method: str, libm: Kernel) -> N
     found, made = libm.advance(state, held, craft, step, how)
     assert found == outcome
     assert expected is None or made == expected
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_companion_that_cannot_go_on_is_lost_in_the_same_way(method: str, libm: Kernel) -> None:
+    spinning, craft = Companion(State(heading=1.7e308, yaw_rate=1.7e308)), Craft(drag_coefficient=0.0)
+    how = Settings(1.0, METHODS[method])
+    found = libm.accompany(spinning, Controls(), craft, 3.0, how, substeps(3.0, 1.0))
+    assert math.isnan(found.state.x)
+    assert repr(found) == repr(accompany(spinning, Controls(), craft, 3.0, how))
+    assert repr(libm.accompany(found, Controls(), craft, 3.0, how, substeps(3.0, 1.0))) == repr(found)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.001])
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "adaptive"])
+def test_a_long_step_is_two_shorter_ones(method: str, friction: float, libm: Kernel) -> None:
+    """To the bit, where both have more sub-steps than are made before the motion is looked at, 65 536."""
+    craft, h = Craft(skirt_friction=friction, rotational_drag=0.1), 2.0**-10
+    start, held, how = State(vx=1.0, yaw_rate=0.1), Controls(9.0, 0.3, 0.1, 0.2), Settings(h, METHODS[method])
+    outcome, whole = libm.advance(start, held, craft, 150_000 * h, how)
+    _, first = libm.advance(start, held, craft, 70_000 * h, how)
+    _, second = libm.advance(first.state, held, craft, 80_000 * h, how)
+    assert (outcome, whole.substeps) == ("advanced", 150_000)
+    assert whole.state == second.state
+    assert whole.stability == max(first.stability, second.stability)
+    assert whole.rotation == max(first.rotation, second.rotation)
 
 
 # ---- ramps, which the Python model does not have
@@ -265,6 +294,19 @@ def test_rk4_keeps_its_order_on_ramps(libm: Kernel) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_a_wind_that_rises_abeam_is_one_from_ahead_turned(method: str, libm: Kernel) -> None:
+    """By a quarter, and the craft with it; the air is calm at first."""
+    craft, how = Craft(rotational_drag=0.1), Settings(0.01, METHODS[method])
+    _, ahead = libm.advance(State(), Controls(5.0, 0.4), craft, 4.0, how, rate=Controls(0.0, wind_x=-0.3))
+    turned = State(heading=math.pi / 2.0)
+    outcome, abeam = libm.advance(turned, Controls(5.0, 0.4), craft, 4.0, how, rate=Controls(0.0, wind_y=-0.3))
+    x, y, heading, vx, vy, yaw_rate = ahead.state
+    assert outcome == "advanced"
+    assert tuple(abeam.state) == pytest.approx((-y, x, heading + math.pi / 2.0, -vy, vx, yaw_rate), rel=1e-9, abs=1e-12)
+    assert abs(vx) > 0.01
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_a_ramp_saturates_and_stays_there(method: str, libm: Kernel) -> None:
     """Thrust meets its limit after 1 s; after that all is as with the limit held."""
     craft = Craft(drag_coefficient=0.0)
@@ -294,6 +336,16 @@ def test_adaptive_that_finds_no_end_is_stopped(tmp_path: Path, libm: Kernel) -> 
     for duration, outcome in ((86400.0, "too many sub-steps"), (60.0, "advanced")):
         assert few.advance(State(), Controls(0.0, 1.0), craft, duration, way)[0] == outcome
     assert libm.advance(State(), Controls(0.0, 1.0), craft, 600.0, way)[0] == "advanced"
+
+
+def test_adaptive_does_not_go_beyond_all_numbers_near_rest(libm: Kernel) -> None:
+    """On ground that hardly rubs, with a tolerance that takes any speed for rest: a refused step leaves no infinity."""
+    craft, how = Craft(skirt_friction=1e-290, drag_coefficient=0.0), Settings(1e140, METHODS["adaptive"], 1e300)
+    state = State(x=sys.float_info.max, vx=1e153)
+    outcome, expected = _of_python(state, Controls(), craft, 1e140, how)
+    found, made = libm.advance(state, Controls(), craft, 1e140, how)
+    assert (found, made) == (outcome, expected)
+    assert all(map(math.isfinite, made.state))
 
 
 def test_a_run_that_is_not_finite_ends_at_once(libm: Kernel) -> None:

@@ -197,6 +197,33 @@ def test_only_initialization_mode_has_parameters_as_knowns(instance: Any, messag
         with pytest.raises(FMICallException):
             partial(instance, unknown, known)
         assert messages[-1].startswith(worded(instance, f"fmi2GetDirectionalDerivative: {said}"))
+    with pytest.raises(FMICallException):
+        instance.getDirectionalDerivative([reference("speed")], [999], [1.0])
+    assert "known with value reference 999: must be a state, an input or" in messages[-1]
+    assert partial(instance, "error.position", "mass") == 0.0  # nothing acts on it at once
+
+
+def test_a_derivative_that_is_no_number_is_refused(instance: Any, messages: list[str]) -> None:
+    """The acceleration is a number, F/m; its derivative, -F/m^2, is none."""
+    put(instance, mass=1e-200, thrust=5.0)
+    instance.setupExperiment()
+    instance.enterInitializationMode()
+    assert get(instance, "acceleration.x") == pytest.approx([5e200], rel=1e-15)
+    with pytest.raises(FMICallException):
+        partial(instance, "acceleration.x", "mass")
+    message = "derivative of acceleration.x with respect to mass = -inf: must be a finite number; the motion is out of"
+    assert messages[-1].startswith(message)
+
+
+def test_parameters_that_contradict_one_another_have_none(stepped: Any) -> None:
+    """In step mode they act from there on."""
+    stepped.reset()
+    start(stepped, thrust=5.0)
+    put(stepped, thrust_min=20.0)
+    with pytest.raises(FMICallException):
+        partial(stepped, "acceleration.x", "thrust")
+    put(stepped, thrust_min=0.0)
+    assert partial(stepped, "acceleration.x", "thrust") == pytest.approx(1.0 / 100.0)
 
 
 def test_partial_derivatives_after_a_step(stepped: Any) -> None:
@@ -301,6 +328,18 @@ def test_a_craft_that_friction_holds_has_no_partial_derivatives(each_native_fmu:
         )
         assert said == [worded(stepping, message)]
         assert partial(stepping, "speed", "velocity.x") == 0.0  # what friction does not act on has them
+        for motion in ("velocity__x", "velocity__y", "velocity__yaw_rate"):  # it slides
+            stepping.reset()
+            start(stepping, skirt_friction=0.1, **{motion: 0.5})
+            assert partial(stepping, "acceleration.x", "thrust") == pytest.approx(1.0 / 100.0)
+        stepping.reset()
+        put(stepping, skirt_friction=0.1)
+        stepping.setupExperiment()
+        stepping.enterInitializationMode()
+        area, length = get(stepping, "projected_area", "length")
+        assert partial(stepping, "projected_area", "length") == pytest.approx(
+            area / (length + get(stepping, "width")[0])
+        )
 
 
 # ---- dependencies of the description

@@ -515,7 +515,7 @@ def _near_rest(
     new = semi_implicit_euler(State(*y), controls, craft, h, 1).state
     change = max(abs(after - before) for after, before in zip(new[3:], y[3:], strict=True))
     error = change * max(1.0, h)
-    return tuple(new), rates_at(tuple(new)), error if math.isfinite(error) else math.inf
+    return tuple(new), rates_at(tuple(new)), error if all(map(math.isfinite, (error, *new))) else math.inf
 
 
 def _rate_function(controls: Controls, craft: Craft) -> Callable[[Vector], Rates]:

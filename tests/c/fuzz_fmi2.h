@@ -18,6 +18,7 @@ static void *no_memory_of_the_hosts(size_t count, size_t size)
 static void *made(struct bytes *bytes, int *listens)
 {
     static const fmi2CallbackFunctions callbacks = {logger, no_memory_of_the_hosts, free, NULL, NULL};
+    static const fmi2CallbackFunctions silent = {NULL, no_memory_of_the_hosts, free, NULL, NULL};
     const unsigned how = a_byte(bytes);
     *listens = how & 2;
     char guid[16];
@@ -26,7 +27,7 @@ static void *made(struct bytes *bytes, int *listens)
     const fmi2Type type = how & 64 ? fmi2ModelExchange : how == 15 ? (fmi2Type)2 : fmi2CoSimulation;
     return fmi2Instantiate(how & 1 ? "craft" : NULL, type,
                            how % 32 == 30 ? guid : how % 32 == 28 ? NULL : VARIANT.guid, NULL,
-                           how & 2 ? &callbacks : NULL, fmi2False, how & 4 ? fmi2True : fmi2False);
+                           how & 2 ? &callbacks : how & 8 ? &silent : NULL, fmi2False, how & 4 ? fmi2True : fmi2False);
 }
 
 static inline int integer_of(void *craft, unsigned reference)

@@ -918,7 +918,7 @@ static double near_rest(struct load_function *f, double time, const double y[COM
     steer_at(f, time + h);
     *rates = rates_at(f, new);
     const double error = change * larger(1.0, h);
-    return isfinite(error) && !isinf(after.heading) ? error : INFINITY;
+    return isfinite(error) && is_finite(&after) ? error : INFINITY;
 }
 
 /* s: where in the communication step the next ramp of an input meets a limit, or its end. */
@@ -1135,7 +1135,7 @@ void kernel_accompany(struct companion *companion, const struct drive *drive, co
             ? in_two_halves(companion, drive, craft, communication_step, settings, &stretch)
             : fixed(&companion->state, drive, craft, settings->integrator, 0.5 * made->substep, 2 * made->substeps,
                     &stretch);
-    const bool made_it = outcome == ADVANCED && is_finite(&stretch.state);
+    const bool made_it = outcome == ADVANCED;
     companion->state = made_it ? stretch.state : LOST;
     companion->proposed = made_it ? stretch.proposed : 0.0;
 }

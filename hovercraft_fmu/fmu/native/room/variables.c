@@ -29,7 +29,7 @@ enum verdict instance_observe_on_demand(struct instance *instance)
     struct content *now = &instance->now;
     if (!now->unread_on_demand)
         return FINE;
-    if (model()->observe_on_demand && model()->observe_on_demand(instance) == REFUSED)
+    if (model()->observe_on_demand(instance) == REFUSED)
         return REFUSED;
     now->unread_on_demand = false;
     return FINE;
@@ -192,7 +192,7 @@ enum verdict instance_set_reals(struct instance *instance, const unsigned *refer
 /* What can be set are small numbers. */
 static enum verdict check_integer(struct instance *instance, const struct variable *variable, int64_t value)
 {
-    if (variable->kind == BOOLEAN && !is_settable(instance, variable))
+    if (variable->kind == BOOLEAN) /* no model has one that can be set */
         return instance_say(instance, REFUSED, "%s = %s: must not be set in state '%s' (%s)", variable->name,
                             value ? "True" : "False", PHASE_NAMES[instance->now.phase], variable->role);
     if (!is_settable(instance, variable))
@@ -231,12 +231,8 @@ enum verdict instance_set_integers(struct instance *instance, enum kind kind, co
 enum verdict instance_get_enumerations(struct instance *instance, const unsigned *references, size_t n,
                                        int64_t *values)
 {
-    for (size_t i = 0; i < n; i++) {
-        int value = 0;
-        if (instance_get_integers(instance, ENUMERATION, &references[i], 1, &value) == REFUSED)
-            return REFUSED;
-        values[i] = value;
-    }
+    for (size_t i = 0; i < n; i++)
+        values[i] = instance->now.integers[references[i]]; /* no model works one out */
     return FINE;
 }
 
@@ -266,12 +262,5 @@ enum verdict instance_get_booleans(struct instance *instance, const unsigned *re
 
 enum verdict instance_set_booleans(struct instance *instance, const unsigned *references, size_t n, const bool *values)
 {
-    for (size_t i = 0; i < n; i++)
-        if (check_integer(instance, &VARIABLES[references[i]], values[i]) == REFUSED)
-            return REFUSED;
-    for (size_t i = 0; i < n; i++) {
-        const int value = values[i];
-        instance_set_integers(instance, BOOLEAN, &references[i], 1, &value);
-    }
-    return FINE;
+    return n == 0 ? FINE : check_integer(instance, &VARIABLES[references[0]], values[0]); /* which refuses it */
 }
