@@ -239,7 +239,9 @@ WATCHED_OUT_OF_RANGE: tuple[tuple[str, int, dict[str, float]], ...] = (
 """Where drag_implicit, which never diverges, leaves the motion finite; and splitting, which turns by halves."""
 
 
-@pytest.mark.parametrize(("name", "method", "given"), WATCHED_OUT_OF_RANGE)
+@pytest.mark.parametrize(
+    ("name", "method", "given"), WATCHED_OUT_OF_RANGE, ids=["stability_number", "rotation_per_substep", "by halves"]
+)
 def test_all_flavours_refuse_a_step_whose_watched_values_overflow(
     name: str, method: int, given: dict[str, float], both: list[tuple[Any, list[str]]]
 ) -> None:
