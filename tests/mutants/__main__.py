@@ -252,7 +252,7 @@ def _prepared(tree: Path) -> None:
 
 def _in_process(work: Any, *given: Any) -> Any:
     """So that this process imports nothing of the project."""
-    with get_context("fork").Pool(1) as pool:
+    with get_context("fork").Pool(1, signal.signal, (signal.SIGTERM, signal.SIG_DFL)) as pool:  # as it ends them
         return pool.apply(work, given)
 
 

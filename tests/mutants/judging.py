@@ -64,7 +64,7 @@ FIRST = 40
 TIME_LIMIT = 900.0
 """s, of all tests of a mutant; a test alone has ten times the CPU time it takes, and 4 s."""
 COMPILER = (shutil.which("clang") or "gcc", "-std=c11", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-g0", "-w",
-            "-I.",            "-Werror=incompatible-pointer-types", "-Werror=int-conversion", "-fvisibility=hidden",
+            "-I.", "-Werror=incompatible-pointer-types", "-Werror=int-conversion", "-fvisibility=hidden",
             "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")  # fmt: skip
 """Without optimization, which is where most of the time would go: the bits are the same."""
 
@@ -236,17 +236,8 @@ class Running:
 
 def run_pytest(tree: Path, files: Iterable[str], serve: Callable[[pytest.Session, Running], None]) -> int:
     """Collect those files in the tree, then serve."""
-    options = [
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:terminal",
-        "-o",
-        "addopts=",
-        "-m",
-        "not once",
-        f"--basetemp={tree / 'temporary'}",
-    ]
+    options = ["-p", "no:cacheprovider", "-p", "no:terminal", "-o", "addopts=", "-m", "not once",
+               f"--basetemp={tree / 'temporary'}"]  # fmt: skip
     plugin = Running(lambda session: serve(session, plugin))
     return int(pytest.main([*options, *(str(tree / "tests" / f"{name}.py") for name in files)], plugins=[plugin]))
 
