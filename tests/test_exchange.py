@@ -1,6 +1,7 @@
 """Model exchange of the native FMU: what may be called when, what is refused, what is read, what a state keeps."""
 
 import math
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from copy import copy
@@ -22,7 +23,7 @@ from hovercraft_fmu.model.dynamics import (
     derivatives,
 )
 from hovercraft_fmu.model.observation import observe_action, observe_motion
-from tests.blobs import SUBSTEPS, with_word
+from tests.blobs import SUBSTEPS, signed, with_word
 from tests.conftest import FMI_2
 from tests.exchange import (
     EVERYWHERE,
@@ -466,6 +467,17 @@ def test_a_forged_phase_is_one_of_its_use(instance: Any, stepped: Any) -> None:
                 each.freeFMUstate(each.deSerializeFMUstate(with_word(content, PHASE, phase % 2**32)))
                 taken.add(phase)
         assert taken == possible
+
+
+def test_a_forged_state_for_solvers_has_no_error_estimate(instance: Any, messages: list[str]) -> None:
+    """The last that a state has is whether there is one, and then it has nine numbers."""
+    go(instance)
+    content = bytes(instance.serializeFMUstate(instance.getFMUstate()))
+    assert content[-12:-8] == bytes(4)
+    forged = signed(content[:-12] + struct.pack("<i9d", 1, *[0.0] * 9) + content[-8:])
+    with pytest.raises(FMICallException):
+        instance.deSerializeFMUstate(forged)
+    assert messages == [f"serialized FMU state of {len(forged)} bytes: must be one that this FMU wrote"]
 
 
 def test_a_forged_state_whose_parameters_contradict_one_another_goes_nowhere(
