@@ -142,6 +142,22 @@ def test_an_adaptive_step_that_is_tried_again_asks_again(opened: Fmu) -> None:
     assert any(later < before for before, later in itertools.pairwise(times))
 
 
+def test_it_asks_of_no_time_after_the_end_where_a_double_hardly_tells_them(opened: Fmu) -> None:
+    """Doubles are 0.24 us apart there, and sub-steps 0.1 us: the last of them end where the step does."""
+    begin, step = 1.7e9, 1e-6
+    times: list[float] = []
+
+    def values(time: float) -> Sequence[float]:
+        times.append(time)
+        return [5.0]
+
+    with opened.instance(intermediate=Intermediate(["thrust"], values)) as craft:
+        craft.start({"integrator": "rk4", "step_size": 1e-7}, start_time=begin)
+        craft.step(begin, step)
+    assert begin == times[0] < begin + step == times[-1] == times[-2]
+    assert times == sorted(times)
+
+
 def test_what_is_read_at_the_communication_point_follows_the_last_answer(opened: Fmu) -> None:
     with opened.instance(intermediate=Intermediate(STEERED, steered)) as craft:
         craft.start()
