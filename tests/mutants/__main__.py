@@ -197,8 +197,9 @@ class Run:
         return Known(found["costs"], self.seconds, COVERAGE, self.path)
 
     def trees(self, place: Path) -> list[Path]:
-        """A copy for each process."""
-        return [Path(shutil.copytree(place / "base", place / str(i))) for i in range(self.parallel)]
+        """A copy for each process, without what tests left: among that are pipes, and links to files without end."""
+        left = shutil.ignore_patterns("temporary")
+        return [Path(shutil.copytree(place / "base", place / str(i), ignore=left)) for i in range(self.parallel)]
 
     def share(self, mutants: Sequence[Mutant], trees: Sequence[Path], known: Known) -> None:
         """Judge them all, in a process for each tree."""
