@@ -19,8 +19,8 @@ from .timeline import merged
 
 SECONDS = 2.5
 """Of work in a chunk, by the costs below: one to five where a processor, or a craft, takes half or twice of them."""
-MOST_BYTES = 100e6
-"""That a worker holds for a chunk, beside the 80 MB that it is, or 150 MB of a cluster's."""
+MOST_BYTES = 60e6
+"""That a process holds for a chunk, beside the 80 MB that a worker is, or 170 MB where it starts the sweep, too."""
 BYTES, BYTES_READ, BYTES_KEPT = 600, 17, 50
 """Of a run: its craft and row; of each value that is read, and of each one of a trajectory, with the file of them."""
 SHARE = 12
