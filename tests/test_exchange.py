@@ -354,6 +354,21 @@ def test_tunable_parameters_act_from_event_mode_on(instance: Any) -> None:
     assert get_vector(instance.getDerivatives) == list(expected)
 
 
+@pytest.mark.parametrize("phase", ["initialization mode", "event mode"])
+def test_a_parameter_that_is_set_to_what_it_is_changes_nothing(phase: str, instance: Any) -> None:
+    """Once the solver goes on, the state is the same, byte by byte."""
+    states = []
+    for again in (False, True):
+        to_phase(instance, phase)
+        if again:
+            put(instance, air_density=Craft().air_density)
+        if phase == "initialization mode":
+            instance.exitInitializationMode()
+        instance.enterContinuousTimeMode()
+        states.append(bytes(instance.serializeFMUstate(instance.getFMUstate())))
+    assert states[0] == states[1]
+
+
 def test_nominals_are_those_of_the_description(instance: Any) -> None:
     assert get_vector(instance.getNominalsOfContinuousStates) == [BY_NAME[name].nominal for name in STATES]
 

@@ -789,6 +789,20 @@ def test_tunable_parameters_change_between_steps(instance: Any) -> None:
     assert_same(instance, get(instance, *STATES, "applied.thrust"), [*end, 3.0])
 
 
+def test_a_parameter_that_is_set_to_what_it_is_changes_nothing(instance: Any) -> None:
+    """Once it is taken up, by the initialization or the next step, the state is the same, byte by byte."""
+    states: dict[bool, list[bytes]] = {False: [], True: []}
+    for again, seen in states.items():
+        instance.reset()
+        values = {"air_density": Craft().air_density} if again else {}
+        start(instance, velocity__x=1.0, **values)
+        seen.append(bytes(instance.serializeFMUstate(instance.getFMUstate())))
+        put(instance, **values)
+        instance.doStep(0.0, 0.5)
+        seen.append(bytes(instance.serializeFMUstate(instance.getFMUstate())))
+    assert states[False] == states[True]
+
+
 def test_ground_and_wind_change_between_steps_and_come_back_with_the_state(instance: Any) -> None:
     start(instance, velocity__x=1.0)
     put(instance, thrust=0.0, skirt_friction=0.1, rotational_drag=0.3, wind__y=0.2)

@@ -327,6 +327,13 @@ def test_a_step_of_adaptive_ends_where_a_ramp_saturates(libm: Kernel) -> None:
     assert made.state.yaw_rate == pytest.approx(30.0 / 500.0 * (port - starboard), rel=1e-12)
 
 
+def test_a_step_of_adaptive_ends_nowhere_else(libm: Kernel) -> None:
+    """Where thrust turns round it meets no limit: a sub-step as long as it may be goes on."""
+    craft, how = Craft(thrust_min=-10.0), Settings(20.0, METHODS["adaptive"], 1e3)
+    ways = [libm.advance(State(), Controls(thrust), craft, 10.0, how, rate=Controls(0.7)) for thrust in (-3.0, 2.0)]
+    assert [(outcome, made.substeps) for outcome, made in ways] == [("advanced", 1)] * 2
+
+
 def test_adaptive_that_finds_no_end_is_stopped(tmp_path: Path, libm: Kernel) -> None:
     """In C as in Python, where the limit is a thousand steps."""
     few = Kernel(
