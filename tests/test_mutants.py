@@ -1,6 +1,7 @@
 """The mutants: what is changed and what never is; a name holds while a line does; what the command refuses."""
 
 import ast
+import json
 from pathlib import Path
 
 import pytest
@@ -117,3 +118,16 @@ def test_what_cannot_be_changed(
     monkeypatch.setattr("sys.argv", ["mutants", file])
     assert main() == 2
     assert capsys.readouterr().err == f"error: {message}\n"
+
+
+def test_a_file_without_tests_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A study's test alone runs it: those judge nothing."""
+    name = "hovercraft_fmu/fmu/native/room/text.c"
+    (tmp_path / "c_lines.json").write_text(json.dumps({name: {"7": ["tests/test_trade.py"], "8": []}}))
+    monkeypatch.chdir(Path(__file__).parents[1])
+    monkeypatch.setattr("sys.argv", ["mutants", name])
+    monkeypatch.setattr("tests.mutants.__main__.COVERAGE", tmp_path)
+    assert main() == 2
+    assert capsys.readouterr().err.startswith(f"error: {name}: no test that judges mutants runs it")

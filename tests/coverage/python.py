@@ -12,6 +12,7 @@ What a fixture of a whole session runs, an FMU's building, stands by the first t
 
 import importlib.util
 import json
+import site
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ from tests.coverage.branches import ROOT, Branch, Taken
 PACKAGE = ROOT / "hovercraft_fmu"
 TEST = "COVERED_TEST"
 """The environment variable of the test that runs."""
+HOOK = "*coverage.pth"
+"""What coverage installs beside itself."""
 PLUGIN = {"PYTEST_PLUGINS": "tests.coverage.plugin"}
 # What a Python FMU carries is a copy: resources/hovercraft_<digest>/model/craft.py.
 CONFIGURATION = """\
@@ -60,7 +63,10 @@ class Python:
     @staticmethod
     def missing() -> str:
         """Why it cannot be measured here."""
-        return "" if importlib.util.find_spec("coverage") else "no coverage: pip install -e '.[test]'"
+        folders = (*site.getsitepackages(), site.getusersitepackages())
+        if importlib.util.find_spec("coverage") and any(path for each in folders for path in Path(each).glob(HOOK)):
+            return ""
+        return f"no coverage that starts with each Python ({HOOK}): pip install -e '.[test]'"
 
     def environment(self, test_file: Path) -> Mapping[str, str]:  # noqa: ARG002 - all files alike
         """Every process of the run finds the configuration there."""

@@ -32,6 +32,8 @@ from .judging import (
     copied,
     enter,
     judge,
+    judges,
+    module,
 )
 from .mutations import Mutant, mutants
 
@@ -42,7 +44,7 @@ else:
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "build" / "mutants.jsonl"
-COVERAGE = KEPT.parent / "coverage" / "python.sqlite"
+COVERAGE = KEPT.parent / "coverage"
 KNOWN = Path(__file__).with_name("known.toml")
 SURVIVORS = Path(__file__).with_name("survivors.toml")
 NATIVE = "hovercraft_fmu/fmu/native"
@@ -66,6 +68,8 @@ def main() -> int:
         if given.known or given.renew:
             return known_ones(given.parallel) if given.known else renew(given.seed)
         drawn = drawing(given.files, given.seed)
+        for name in map(_inside, given.files):
+            _require_tests(name)
         verdicts = Run(given.parallel, given.seconds).judge(drawn, given.sample)
     except (BeforeError, OSError, SyntaxError) as error:
         return print(f"error: {error}", file=sys.stderr) or 2
@@ -93,6 +97,12 @@ def _inside(file: str) -> str:
     if path.suffix not in (".c", ".h", ".py") or not path.is_relative_to(ROOT / "hovercraft_fmu"):
         raise BeforeError(f"{file}: must be a file of C or Python in hovercraft_fmu/")
     return str(path.relative_to(ROOT))
+
+
+def _require_tests(name: str) -> None:
+    tests = Known({}, 0.0, COVERAGE, KEPT).through(name)
+    if tests is not None and not any(judges(module(test)) for test in tests):
+        raise BeforeError(f"{name}: no test that judges mutants runs it, as build/coverage/ tells")
 
 
 # ---- known ones

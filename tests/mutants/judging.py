@@ -350,7 +350,7 @@ class Known:
             return self.only[mutant.name]
         is_c = not mutant.file.endswith(".py")
         likely = LIKELY.get(Path(mutant.file).name, "lifecycle").split()
-        covering = set() if is_c else self.covering(mutant)
+        covering = self.through(mutant.file, mutant.line - 4, mutant.line + 1) or set()
         noticed, alike = Counter[str](), Counter[str]()
         for (file, test), times in self.kills.items():
             weight = 5 * times if file == mutant.file else times if file[-2:] == mutant.file[-2:] else 0
@@ -363,7 +363,7 @@ class Known:
                 name not in (*NOT_OF_C, *ANEW) and "[python" not in test if is_c else share == 1.0 or name not in ANEW
             )
             if is_apt and THREADS not in test:
-                sooner = 0.05 + 0.5 * (name in likely) + 1.0 * (test in covering)
+                sooner = 0.05 + 0.5 * (name in likely) + 1.0 * (test in covering or test.split("::")[0] in covering)
                 worth[test] = (noticed[test] + 0.1 * alike[test.split("[")[0]] + sooner) / (cost + 0.03)
         chosen, spent = [], 0.0
         for test in sorted(worth, key=lambda test: -worth[test]):
@@ -373,17 +373,23 @@ class Known:
         order = list(dict.fromkeys(module(test) for test in rest))
         return [*first, *sorted(rest, key=lambda test: order.index(module(test)))]
 
-    def covering(self, mutant: Mutant) -> set[str]:
-        """Tests that go through the lines about it, where the coverage of Python is at hand."""
-        if not self.coverage or not self.coverage.exists():
-            return set()
-        with closing(sqlite3.connect(f"file:{self.coverage}?mode=ro", uri=True)) as database:
-            found = database.execute(
-                "select distinct context from arc join file on file.id = file_id "
-                "join context on context.id = context_id where path like ? and abs(tono) between ? and ?",
-                (f"%/{mutant.file}", mutant.line - 4, mutant.line + 1),
-            )
-            return {name.split("|")[0] for (name,) in found}
+    def through(self, file: str, first: int = 0, last: int = 1 << 30) -> set[str] | None:
+        """Tests that go through lines of a file: of C, files of tests. None where `tests.coverage` has not told."""
+        if not self.coverage:
+            return None
+        database_path, lines_path = self.coverage / "python.sqlite", self.coverage / "c_lines.json"
+        if file.endswith(".py") and database_path.exists():
+            with closing(sqlite3.connect(f"file:{database_path}?mode=ro", uri=True)) as database:
+                found = database.execute(
+                    "select distinct context from arc join file on file.id = file_id "
+                    "join context on context.id = context_id where path like ? and abs(tono) between ? and ?",
+                    (f"%/{file}", first, last),
+                )
+                return {name.split("|")[0] for (name,) in found} - {""}
+        if not file.endswith(".py") and lines_path.exists():
+            lines = json.loads(lines_path.read_text(encoding="utf-8")).get(file, {})
+            return {test for line, tests in lines.items() if first <= int(line) <= last for test in tests}
+        return None
 
 
 def module(test: str) -> str:
@@ -396,8 +402,11 @@ def needs_others(test: str) -> bool:
 
 
 def test_files(tree: Path) -> list[str]:
-    names = sorted(path.stem for path in (tree / "tests").glob("test_*.py"))
-    return [name for name in names if not any(name == f"test_{each}" or each in name.split("_") for each in LEFT_OUT)]
+    return sorted(path.stem for path in (tree / "tests").glob("test_*.py") if judges(path.stem))
+
+
+def judges(name: str) -> bool:
+    return not any(name == f"test_{each}" or each in name.split("_") for each in LEFT_OUT)
 
 
 def baseline(tree: Path, said: Callable[[str], None]) -> dict[str, float]:
