@@ -198,6 +198,22 @@ def test_a_bad_list_is_refused_and_changes_nothing(name: str, instance: Any, mes
     assert everything(instance) == before
 
 
+@pytest.mark.parametrize("kind", ["Float64", "Int32", "Int64"])
+def test_a_list_is_set_as_one_value_after_the_other(kind: str, instance: Any) -> None:
+    """All of a kind that can be set, in either order; and it reads so, in either order."""
+    kinds = {"Float64": "Real", "Int32": "Integer", "Int64": "Enumeration"}
+    these = [v for v in VARIABLES if v.kind == kinds[kind] and v.start is not None]
+    references = [v.reference for v in these]
+    values = [v.start + i / 64.0 if kind == "Float64" else 2 for i, v in enumerate(these)]
+    setter, getter = getattr(instance, f"set{kind}"), getattr(instance, f"get{kind}")
+    for way in (1, -1):
+        instance.reset()
+        setter(references[::way], values[::way])
+        instance.enterInitializationMode()
+        assert list(getter(references)) == values
+        assert list(getter(references[::-1])) == values[::-1]
+
+
 # ---- partial derivatives
 
 
