@@ -52,7 +52,7 @@ def everything(instance: Any) -> dict[str, Any]:
     return {variable.name: value for variable, value in zip((*REALS, *INTEGERS), values, strict=True)}
 
 
-DISCARD, ERROR, FATAL = 2, 3, 4
+WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 DISCARDED_BY_FMI_2 = {
     "fmi2SetReal": "both", "fmi2SetInteger": "both", "fmi2DoStep": "both", "fmi2SetContinuousStates": "exchange",
     "fmi2GetReal": "exchange", "fmi2GetDerivatives": "exchange", "fmi2GetContinuousStates": "exchange",
@@ -166,7 +166,21 @@ def one(fmu: Path, exchange: bool = False) -> Iterator[tuple[Any, list[str]]]:
 def _low_level(instance: Instance, opened: Fmu) -> Any:
     made = instance.fmpy
     made.host, made.opened = instance, opened  # which live as long
+    made._functions = {name: _loud(each, instance.messages) for name, each in made._functions.items()}
     return Instance3(made) if opened.is_fmi_3 else made
+
+
+def _loud(function: Any, messages: list[str]) -> Any:
+    """A function of the standard, of which a warning comes with a message: else all is well."""
+
+    def call(*arguments: Any) -> Any:
+        before = len(messages)
+        status = function(*arguments)
+        assert status != WARNING or len(messages) > before, f"{function.__name__}: a warning without a word"
+        return status
+
+    vars(call).update({name: getattr(function, name) for name in ("restype", "argtypes", "argnames")})
+    return call
 
 
 def another(instance: Any) -> Any:

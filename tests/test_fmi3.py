@@ -204,7 +204,7 @@ def test_a_list_is_set_as_one_value_after_the_other(kind: str, instance: Any) ->
     kinds = {"Float64": "Real", "Int32": "Integer", "Int64": "Enumeration"}
     these = [v for v in VARIABLES if v.kind == kinds[kind] and v.start is not None]
     references = [v.reference for v in these]
-    values = [v.start + i / 64.0 if kind == "Float64" else 2 for i, v in enumerate(these)]
+    values = [(v.start or 0.0) + i / 64.0 if kind == "Float64" else 2 for i, v in enumerate(these)]
     setter, getter = getattr(instance, f"set{kind}"), getattr(instance, f"get{kind}")
     for way in (1, -1):
         instance.reset()

@@ -301,7 +301,7 @@ class Patched:
         try:
             with Instance(self.description, str(self.folder / str(self.count)), exchange=False) as made:
                 made.start()
-                assert made.port("mass").get() == [own.starts[reference("mass")]]
+                assert made.port("mass", "substeps").get() == [own.starts[reference("mass")], 0]
         except SimulationError as error:
             return str(error)
         return ""
@@ -360,6 +360,13 @@ def test_start_values_that_a_host_could_not_set_are_refused(
     for name, value in starts.items():
         struct.pack_into("<d", content, at(bytes(content)) + HEAD.size + 8 * reference(name), value)
     assert copies.said(resummed(bytes(content), own), own).startswith(message)
+
+
+def test_what_has_no_start_value_takes_none_from_the_block(copies: Patched) -> None:
+    own = own_block(mass=99.0)
+    content = bytearray(patched(copies.library, own, "Any.so"))
+    struct.pack_into("<d", content, at(bytes(content)) + HEAD.size + 8 * reference("substeps"), 7.0)
+    assert copies.said(resummed(bytes(content), own), own) == ""
 
 
 def test_a_block_of_other_code_or_another_length_is_refused(copies: Patched) -> None:

@@ -22,6 +22,7 @@ from typing import Any
 from .judging import (
     NONE,
     NOTICED,
+    SAME_CODE,
     SURVIVED,
     TIMED_OUT,
     BeforeError,
@@ -281,13 +282,13 @@ def report(verdicts: Sequence[Verdict], seed: int) -> None:
         print(f"survivor: line {verdict.line} of {verdict.name}: {why}")
     drawn = len(verdicts) - counts[NONE]
     same = {each["mutant"] for each in _table(SURVIVORS, "survivor") if each["equivalent"]}
-    equivalent = sum(verdict.name in same or verdict.by != "" for verdict in left)
+    equivalent = sum(verdict.name in same or verdict.by == SAME_CODE for verdict in left)
     noticed = counts[NOTICED] + counts[TIMED_OUT]
+    spent = sum(verdict.seconds for verdict in verdicts) / max(1, len(verdicts))
     print(
-        f"{drawn} mutants drawn with seed {seed} ({counts[NONE]} more are none: they do not compile, or are not in "
-        f"this build): {noticed} noticed ({counts[TIMED_OUT]} of them by a time limit), {len(left)} survived "
-        f"({equivalent} equivalent, {len(left) - equivalent} untested): {100 * noticed / max(1, drawn):.1f} % noticed; "
-        f"{sum(verdict.seconds for verdict in verdicts) / max(1, len(verdicts)):.1f} s of CPU time each"
+        f"{drawn} mutants drawn with seed {seed} ({counts[NONE]} more do not compile): {noticed} noticed "
+        f"({counts[TIMED_OUT]} of them by a time limit), {len(left)} survived ({equivalent} equivalent, "
+        f"{len(left) - equivalent} not): {100 * noticed / max(1, drawn):.1f} % noticed; {spent:.1f} s of CPU time each"
     )
 
 

@@ -13,6 +13,7 @@ import inspect
 import json
 import os
 import pickle
+import re
 import select
 import shutil
 import signal
@@ -45,7 +46,7 @@ THREADS = "test_the_study_is_held_against_scipy"
 """A test that needs threads that a fork has not got."""
 OTHERS = (*("autopilot", "fleet", "guidance", "tether"), "every", "letter", "machine", "variants")
 """Test files that need machine code of other models, or of many craft."""
-NOT_OF_C = ("choices", "craft", "dynamics", "folding", "identity", "integrators", "interface", "subcycling")
+NOT_OF_C = ("craft", "dynamics", "folding", "identity", "integrators", "interface", "subcycling")
 """Test files that run no native FMU, or of which other ones say more."""
 LIKELY = {
     "kernel.c": "native_kernel", "linearization.c": "partial_derivatives", "partials.c": "partial_derivatives",
@@ -84,7 +85,12 @@ class Verdict:
 
 
 NOTICED, TIMED_OUT, SURVIVED, NONE = "noticed", "timed out", "survived", "no mutant"
-SAME_CODE = "same machine code"
+SAME_CODE, ELSEWHERE = "same machine code", "not in this machine's build"
+DIGESTS = re.compile(
+    rb"(?<![0-9a-f])[0-9a-f]{8}(?:-?[0-9a-f]{4}){3}-?[0-9a-f]{12}(?![0-9a-f])|^    UINT64_C\(0x[0-9a-f]+\)$",
+    re.MULTILINE,
+)
+"""Of the code, as it is or as a GUID, and the checksum of what holds them: others in every mutant."""
 STAGES = (("-E", "-P"), ("-O2",))
 """Options that show what the compiler sees of the units, and the machine code that it makes."""
 
@@ -158,10 +164,12 @@ class Compilation:
                 made = [self.object(each, source, "-O0") for source in each.sources]
                 subprocess.run([*COMPILER, "-shared", *map(str, made), "-o", str(path)], check=True)
 
-    def object(self, each: Any, source: str, *options: str) -> Path:
-        """Of a unit; one that was compiled before is kept."""
+    def object(self, each: Any, source: str, *options: str, named: bool = True) -> Path:
+        """Of a unit, with the digest of the code in it or with none; one that was compiled before is kept."""
         folder = f"{Path(source).parent}/"
         files = {name: content for name, content in each.files.items() if name.startswith(folder)}
+        if not named:
+            files = {name: DIGESTS.sub(b"0", content) for name, content in files.items()}
         key = sha256(repr((source, options, sorted(files.items()))).encode()).hexdigest()
         path = self.objects / f"{key}.o"
         if not path.exists():
@@ -179,7 +187,11 @@ class Compilation:
         """The machine code of the hovercraft's units, or with -E what the compiler sees of them."""
         from hovercraft_fmu.libraries import libraries
 
-        return [self.object(each, source, *options).read_bytes() for each in libraries()[:2] for source in each.sources]
+        return [
+            self.object(each, source, *options, named=False).read_bytes()
+            for each in libraries()[:2]
+            for source in each.sources
+        ]
 
 
 def compile_all(tree: Path) -> None:
@@ -620,7 +632,7 @@ def _compiled(tree: Path, mutant: Mutant, known: Known, compiled: Compilation, r
         left = {*COMPILED.iterdir(), *compiled.objects.iterdir()} - before
     if outcome == SURVIVED:
         text, code = (found == compiled.units(*options) for found, options in zip(seen, STAGES, strict=True))
-        outcome, by = (NONE, "not in this machine's build") if text else (SURVIVED, SAME_CODE if code else "")
+        by = ELSEWHERE if text else SAME_CODE if code else ""
     for path in left:
         shutil.rmtree(path) if path.is_dir() else path.unlink()
     return _verdict(mutant, outcome, by, cpu() - began)

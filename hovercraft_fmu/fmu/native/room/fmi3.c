@@ -171,7 +171,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_def
 {
     const fmi3Status status = STATUS_OF(SET_UP, true, instance_set_up(c, start_time, tolerance_defined, tolerance,
                                                                       stop_time_defined ? stop_time : INFINITY));
-    return status <= fmi3Warning ? MADE(instance_initialize(c)) : status;
+    return status == fmi3OK ? MADE(instance_initialize(c)) : status;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c)

@@ -38,13 +38,11 @@ enum verdict instance_reset(struct instance *instance)
 
 enum verdict instance_start(struct instance *instance, enum use use, const struct services *services, bool logging)
 {
-    instance->now = (struct content){.use = use, .phase = INSTANTIATED};
+    instance->now.use = use;
     instance->services = *services;
     instance->logged = logging ? ~0u : 1u << DISCARDED | 1u << REFUSED;
     instance->call = NO_CALL;
     instance->refusal = REFUSED;
-    instance->errors = 0;
-    instance->inside = instance->telling = false;
     return variant_check(instance) == REFUSED ? REFUSED : instance_reset(instance);
 }
 

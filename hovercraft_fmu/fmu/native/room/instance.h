@@ -111,8 +111,8 @@ static inline bool instance_is_calling(const struct instance *instance)
     return instance && (instance->telling || instance->now.phase == INTERMEDIATE_UPDATE);
 }
 
-/* Errors are told even where `logging` is off: an instance that fails without a word helps nobody. Refused: the
-   library's start values (variant.h) cannot be. */
+/* Of memory that is zero. Errors are told even where `logging` is off: an instance that fails without a word helps
+   nobody. Refused: the library's start values (variant.h) cannot be. */
 DOOR enum verdict instance_start(struct instance *instance, enum use use, const struct services *services,
                                  bool logging);
 DOOR enum verdict instance_reset(struct instance *instance);
