@@ -5,6 +5,7 @@ import math
 import random
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,7 +31,7 @@ from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.model.integrators import integrator_number
 from hovercraft_fmu.model.observation import observe_action, observe_motion
-from hovercraft_fmu.model.subcycling import Settings, advance
+from hovercraft_fmu.model.subcycling import Settings, advance, rounding
 from hovercraft_fmu.scenes import SCENES
 from tests.blobs import with_build, with_substeps
 from tests.conftest import Fresh
@@ -830,6 +831,31 @@ def test_the_default_time_may_be_off_by_a_rounding(instance: Any) -> None:
         time += 0.1
     assert count(instance) == 100 * 1000
     instance.doStep(100.0, 0.1)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_time_may_be_off_by_the_whole_rounding_and_by_no_more(
+    sign: float, instance: Any, messages: list[str]
+) -> None:
+    """Before 0 the start is the largest number at hand, so the sums are exact."""
+    most = rounding(1.0, 0.25)
+    start(instance, -1.0)
+    instance.doStep(-1.0 + sign * most, 0.25)
+    instance.reset()
+    start(instance, -1.0)
+    with pytest.raises(FMICallException):
+        instance.doStep(-1.0 + sign * 1.5 * most, 0.25)
+    assert "must be where the last step ended" in messages[-1]
+
+
+def test_a_step_may_lead_past_the_stop_time_by_the_whole_rounding_and_by_no_more(instance: Any) -> None:
+    for factor, fine in ((1.0, True), (1.5, False)):
+        instance.reset()
+        instance.setupExperiment(startTime=-1.0, stopTime=-0.75 - factor * rounding(1.0, 0.25))
+        instance.enterInitializationMode()
+        instance.exitInitializationMode()
+        with nullcontext() if fine else pytest.raises(FMICallException):
+            instance.doStep(-1.0, 0.25)
 
 
 @settings(max_examples=25)
