@@ -9,7 +9,7 @@ import json
 import re
 import shutil
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -62,18 +62,21 @@ class Page:
 
 def count_in_windows(folder: Path) -> None:
     """From now on every window that is opened from this process counts, and tells when it leaves a page."""
-    from playwright.sync_api import BrowserContext
+    from playwright.sync_api import Browser, BrowserContext
     from playwright.sync_api import Page as Window
 
-    open_window, go, close = BrowserContext.new_page, Window.goto, BrowserContext.close
+    go, close = Window.goto, BrowserContext.close
     sessions: dict[Window, Any] = {}
 
-    def opened(context: BrowserContext) -> Window:
-        page = open_window(context)
-        sessions[page] = session = context.new_cdp_session(page)
-        session.send("Profiler.enable")
-        session.send("Profiler.startPreciseCoverage", {"callCount": True, "detailed": True})
-        return page
+    def counting(open_window: Callable[..., Window]) -> Callable[..., Window]:
+        def opened(owner: Browser | BrowserContext, **options: Any) -> Window:
+            page = open_window(owner, **options)
+            sessions[page] = session = page.context.new_cdp_session(page)
+            session.send("Profiler.enable")
+            session.send("Profiler.startPreciseCoverage", {"callCount": True, "detailed": True})
+            return page
+
+        return opened
 
     def leave(page: Window) -> None:
         for counted in sessions[page].send("Profiler.takePreciseCoverage")["result"]:
@@ -89,7 +92,8 @@ def count_in_windows(folder: Path) -> None:
         close(context)
 
     for kind, name, function in (
-        (BrowserContext, "new_page", opened),
+        (Browser, "new_page", counting(Browser.new_page)),
+        (BrowserContext, "new_page", counting(BrowserContext.new_page)),
         (BrowserContext, "close", closed),
         (Window, "goto", left),
     ):

@@ -36,6 +36,7 @@ include =
     */resources/*_????????????????/*
 omit = */pythonfmu/*
 concurrency = multiprocessing,thread
+patch = _exit
 context = ${{{test}-}}
 disable_warnings = no-data-collected
 
