@@ -102,11 +102,11 @@ def slices(content: bytes) -> list[bytes]:
     assert magic == 0xCAFEBABE
     parts = []
     for i in range(count):
-        cpu, _, offset, size, alignment = struct.unpack_from(">5I", content, 8 + 20 * i)
+        cpu, subtype, offset, size, alignment = struct.unpack_from(">5I", content, 8 + 20 * i)
         assert offset % (1 << alignment) == 0
         part = content[offset : offset + size]
         assert len(part) == size
-        assert struct.unpack_from("<I", part, 4)[0] == cpu
+        assert struct.unpack_from("<2I", part, 4) == (cpu, subtype)
         parts.append(part)
     return parts
 

@@ -2,6 +2,7 @@
 
 import re
 import zipfile
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,30 @@ def test_derivatives_limits_and_descriptions(description: Any) -> None:
         assert (float(by_name[name].min), float(by_name[name].max)) == (0.0, 1.0)
     fraction = by_name["drag_center_fraction"]
     assert (float(fraction.min), float(fraction.max)) == (-0.5, 0.5)
+
+
+def exponents(name: str) -> dict[str, int]:
+    """What a unit's name says of SI's base units: `N.s/m` is kg/s."""
+    found: Counter[str] = Counter()
+    for sign, part in zip((1, -1), name.split("/"), strict=False):
+        for symbol, power in re.findall(r"([A-Za-z]+)(\d*)", part):
+            for base, each in {"N": {"kg": 1, "m": 1, "s": -2}}.get(symbol, {symbol: 1}).items():
+                found[base] += sign * each * int(power or 1)
+    return {base: power for base, power in found.items() if power}
+
+
+def test_a_unit_is_what_its_name_says(xml: Any) -> None:
+    units = {node.get("name"): dict(node.find("BaseUnit").attrib) for node in xml.iter("Unit")}
+    assert len(units) > 10
+    assert {name: {base: int(power) for base, power in each.items()} for name, each in units.items()} == {
+        name: exponents(name) for name in units
+    }
+
+
+def test_a_type_says_its_quantity(xml: Any) -> None:
+    types = [node for each in xml.iter("SimpleType") for node in each]
+    assert {node.tag for node in types} == {"Real", "Enumeration"}
+    assert all(node.get("quantity") for node in types)
 
 
 def test_units(description: Any, xml: Any) -> None:
