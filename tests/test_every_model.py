@@ -128,6 +128,19 @@ def test_a_refused_call_says_why_and_changes_nothing(
     driven(instance, model, rows[1:])
 
 
+def test_a_list_reads_as_one_value_after_the_other(instance: Any, flavour: Flavour, model: Model) -> None:
+    """Of each type, in either order, and where one stands in it twice."""
+    start(instance)
+    integers = "getInteger" if flavour.fmi == 2 else "getInt32"
+    getters = {"Real": "getReal", "Integer": integers, "Boolean": "getBoolean"}
+    for kind, getter in getters.items():
+        references = [v.reference for v in model.variables if v.kind == kind]
+        get = getattr(instance, getter)
+        one_by_one = [get([each])[0] for each in references]
+        assert list(get(references)) == one_by_one
+        assert list(get([*references[::-1], *references])) == one_by_one[::-1] + one_by_one
+
+
 @pytest.mark.parametrize("phase", ["before", "after"])
 def test_there_is_no_step_before_the_start_and_after_the_end(phase: str, instance: Any, messages: list[str]) -> None:
     if phase == "after":
