@@ -372,11 +372,13 @@ class Known:
         worth = {}
         for test, cost in self.costs.items():
             name = module(test).removeprefix("test_")
-            is_apt = (
-                name not in (*NOT_OF_C, *ANEW) and "[python" not in test if is_c else share == 1.0 or name not in ANEW
-            )
+            if is_c:
+                runs_it = not covering or test.split("::")[0] in covering
+                is_apt = runs_it and name not in (*NOT_OF_C, *ANEW) and "[python" not in test
+            else:
+                is_apt = share == 1.0 or name not in ANEW
             if is_apt and THREADS not in test:
-                sooner = 0.05 + 0.5 * (name in likely) + 1.0 * (test in covering or test.split("::")[0] in covering)
+                sooner = 0.05 + 3.0 * (name in likely) + 1.0 * (test in covering)
                 worth[test] = (noticed[test] + 0.1 * alike[test.split("[")[0]] + sooner) / (cost + 0.03)
         chosen, spent = [], 0.0
         for test in sorted(worth, key=lambda test: -worth[test]):
