@@ -689,7 +689,7 @@ def test_clean_under_sanitizers_over_the_life_cycle(sanitized_fmus: list[Path]) 
     # a run of its own, which shares no folder with this one's workers
     alone = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")}
     env = {**alone, "NATIVE_FMU": two, "NATIVE3_FMU": three, "LD_PRELOAD": ":".join(runtime), "CI": "",
-           "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=0"}  # fmt: skip
+           "PYTHONMALLOC": "malloc", "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=0"}  # fmt: skip
     files = [f"tests/test_{each}.py" for each in ("lifecycle", "native", "exchange", "partial_derivatives", "fmi3")]
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--assert=plain", *files,
                "-k", "not python and not sanitize and not other_hosts and not bits_of_fmi_2 and not scene",
