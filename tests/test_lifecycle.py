@@ -264,6 +264,20 @@ def test_all_flavours_refuse_a_step_whose_watched_values_overflow(
     ]
 
 
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_all_flavours_name_what_is_not_finite(axis: str, both: list[tuple[Any, list[str]]]) -> None:
+    """Without drag the velocities last, while the position leaves all numbers."""
+    values = {f"velocity.{axis}": 1e308, "drag_coefficient": 0.0, "step_size": 10.0}
+    for instance, _ in both:
+        instance.setReal([reference(each) for each in values], list(values.values()))
+        start(instance)
+        with pytest.raises(FMICallException):
+            instance.doStep(0.0, 20.0)
+    (_, ours), (_, said) = both
+    assert ours == said
+    assert said[-1].startswith(f"pose.{axis} = inf after 0.0 s: must stay a finite number")
+
+
 @pytest.mark.parametrize("method", ["splitting", "adaptive"])
 @pytest.mark.parametrize(
     ("name", "value", "beside"),

@@ -322,11 +322,14 @@ def test_a_craft_that_friction_holds_has_no_partial_derivatives(each_native_fmu:
         start(stepping, skirt_friction=0.1)
         with pytest.raises(FMICallException):
             partial(stepping, "acceleration.x", "thrust")
+        unknowns = [reference(name) for name in ("pose.x", "acceleration.yaw", "speed")]
+        with pytest.raises(FMICallException):  # wherever it stands
+            stepping.getDirectionalDerivative(unknowns, [reference("velocity.x")], [1.0])
         message = (
             "fmi2GetDirectionalDerivative: the craft is at rest on ground that rubs: it must slide to have partial "
             "derivatives"
         )
-        assert said == [worded(stepping, message)]
+        assert said == [worded(stepping, message)] * 2
         assert partial(stepping, "speed", "velocity.x") == 0.0  # what friction does not act on has them
         for motion in ("velocity__x", "velocity__y", "velocity__yaw_rate"):  # it slides
             stepping.reset()
