@@ -171,6 +171,10 @@ BAD_LISTS: dict[str, tuple[Callable[[Any], object], str]] = {
         lambda i: i.getDirectionalDerivative([3], [0, 1], [1.0]),
         "fmi3GetDirectionalDerivative: nSeed = 1, nSensitivity = 1: must be 2 and 1",
     ),
+    "a seed of two": (
+        lambda i: i.getDirectionalDerivative([3, 4], [0, 1], [1.0]),
+        "fmi3GetDirectionalDerivative: nSeed = 1, nSensitivity = 2: must be 2 and 2",
+    ),
     "sensitivities": (
         lambda i: i.getAdjointDerivative([3], [0, 1], [1.0]),
         "fmi3GetAdjointDerivative: nSeed = 1, nSensitivity = 1: must be 1 and 2",

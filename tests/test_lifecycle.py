@@ -818,6 +818,18 @@ def test_a_parameter_that_is_set_to_what_it_is_changes_nothing(instance: Any) ->
     assert states[False] == states[True]
 
 
+def test_the_watched_values_are_those_of_the_fastest_substep(instance: Any) -> None:
+    """Coasting straight ahead the first: 2 h k |u| (1/m + x_d^2/I), k of (length + width)/2 height; spinning h |r|."""
+    start(instance, velocity__x=2.0, thrust=0.0)
+    instance.doStep(0.0, 0.1)
+    expected = [2.0 * 0.001 * (0.5 * 1.225 * 1.25 * 15.0 * 5.0) * 2.0 * (1.0 / 100.0 + 25.0 / 500.0), 0.0]
+    assert get(instance, "stability_number", "rotation_per_substep") == pytest.approx(expected, rel=1e-12)
+    instance.reset()
+    start(instance, velocity__yaw_rate=-0.3, thrust=0.0, drag_coefficient=0.0)
+    instance.doStep(0.0, 0.1)
+    assert get(instance, "stability_number", "rotation_per_substep") == pytest.approx([0.0, 0.0003], rel=1e-12)
+
+
 def test_ground_and_wind_change_between_steps_and_come_back_with_the_state(instance: Any) -> None:
     start(instance, velocity__x=1.0)
     put(instance, thrust=0.0, skirt_friction=0.1, rotational_drag=0.3, wind__y=0.2)
