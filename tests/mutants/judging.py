@@ -53,7 +53,7 @@ LIKELY = {
     "exchange.c": "exchange", "serialize.c": "lifecycle native", "text.c": "native_kernel", "fmi2.c": "lifecycle calls",
     "fmi3.c": "fmi3 intermediate_update", "hovercraft.c": "native error_estimate", "variant.c": "variants",
     "rates.c": "native fmi3", "step.c": "lifecycle intermediate_update", "messages.c": "fmi3 lifecycle",
-    "memory.c": "own_memory", "variables.c": "lifecycle fmi3 every_model",
+    "memory.c": "own_memory", "variables.c": "lifecycle fmi3 every_model", "craft_native.py": "fmi3 choices native",
     "dynamics.py": "dynamics terms native_kernel", "integrators.py": "integrators native_kernel", "craft.py": "craft",
     "subcycling.py": "subcycling native_kernel", "error_estimate.py": "error_estimate native_kernel",
     "description.py": "fmi3 fmu interface", "interface.py": "interface native_sources", "block.py": "variants",
