@@ -18,7 +18,7 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from hovercraft_fmu.drawing.palette import HULL, WARNING, WINDOW_JETS
-from hovercraft_fmu.fmu.icon import outline
+from hovercraft_fmu.drawing.shapes import outline
 from hovercraft_fmu.fmu.interface import INPUTS, STATES
 from hovercraft_fmu.fmu.start_values import Value
 from hovercraft_fmu.host import SimulationError

@@ -1,6 +1,5 @@
 """What the standards ask of the files of an FMU, rule by rule; in brackets the sections of FMI 2.0.5 and FMI 3.0.2."""
 
-import io
 import re
 import zipfile
 from ctypes import byref, c_int
@@ -8,18 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
-import numpy as np
 import pytest
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from lxml import etree
-from PIL import Image
 
 from hovercraft_fmu.autopilot.pilot_interface import AUTOPILOT_MODEL
 from hovercraft_fmu.autopilot.pilot_native import AUTOPILOT, AUTOPILOT_NATIVE, AUTOPILOT_NATIVE3
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, PYTHON, Flavour, model_description, xml
 from hovercraft_fmu.fmu.extras import RESULT, terminals
-from hovercraft_fmu.fmu.icon import HULL, JET, SEA, icon_png
 from hovercraft_fmu.fmu.interface import BY_NAME, EXTERNAL, HOVERCRAFT, INPUTS, STATES
 from hovercraft_fmu.studies.pages import default_result
 from tests.exchange import get_vector, go, put_states
@@ -256,16 +252,6 @@ def test_the_icon_lies_in_its_coordinate_system(native3_fmu: Path) -> None:
     assert system["y1"] < system["y2"]
     assert system["suggestedScalingFactorTo_mm"] > 0.0
     assert icon == {key: system[key] for key in ("x1", "y1", "x2", "y2")}
-
-
-def test_the_icon_is_a_craft_that_is_the_same_on_either_side(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drawn straight, it is its own mirror image but for what a line of pixels rounds; the jets are at the bow."""
-    monkeypatch.setattr("hovercraft_fmu.fmu.icon.HEADING", 0.0)
-    picture = Image.open(io.BytesIO(icon_png()))
-    pixels = np.asarray(picture).astype(int)
-    assert np.abs(pixels - pixels[::-1]).max() < 60
-    colours = {f"#{r:02x}{g:02x}{b:02x}" for r, g, b in pixels[32:96, 64:, :3].reshape(-1, 3)}
-    assert {SEA, HULL, JET} <= colours
 
 
 def test_a_variable_is_named_terminal_and_member(native3_fmu: Path) -> None:

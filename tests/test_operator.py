@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hovercraft_fmu.fmu.icon import outline
+from hovercraft_fmu.drawing.shapes import outline
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls
 from hovercraft_fmu.view.camera import Camera, wrapped

@@ -1,13 +1,12 @@
 """The colours of every picture and animation: one for each meaning, told apart in greyscale and by the colour-blind.
 
 What stands side by side differs in lightness, too; lines of methods have a marker each. tests/test_palette.py measures
-it. (The icon of the FMU, a floor below, has its own; the sea and the hull are from there.)
+it. (The icon of the FMU is a file; the sea and the hull are as there.)
 """
 
 from types import MappingProxyType
 from typing import NamedTuple
 
-from ..fmu import icon
 from ..model.integrators import INTEGRATORS
 
 
@@ -30,7 +29,7 @@ METHODS = MappingProxyType({method.name: style for method, style in zip(INTEGRAT
 OTHER = SERIES[-1].color
 """Of a second run with the method of the first."""
 
-SEA, HULL = icon.SEA, icon.HULL
+SEA, HULL = "#0b4f6c", "#fbfbff"
 CRAFT, WIND, SWAY, INK = "#d3e7f0b0", "#5b7f95", "#f08a24", "#000000"
 QUIET, FAINT_LINE = "#606060", "#b0b0b0"
 """What is there for comparison; lines on the ground."""

@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fmu.icon import outline
 from ..model.craft import Craft
 from .figures import new_figure
 from .palette import CRAFT, INK, PORT, SEA, STARBOARD, SWAY, WIND
-from .shapes import placed
+from .shapes import outline, placed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

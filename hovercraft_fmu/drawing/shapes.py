@@ -29,3 +29,19 @@ def jets(craft: Craft, thrust: float, port: float, starboard: float) -> Mapping[
         "starboard": [(bow - root, side), (bow + root, side), (bow, side + reach * starboard)],
     }
     return {name: triangles[name] for name, push in zip(triangles, (thrust, port, starboard), strict=True) if push}
+
+
+def outline(craft: Craft) -> Shape:
+    """The craft as five lines, around the centre of gravity, bow to the right.
+
+    The closed outline in the body frame [m]: the box with a bow tip ahead of it; the first point is the last one, too.
+    """
+    length, width = craft.length, craft.width
+    return [
+        (0.75 * length, 0.0),
+        (0.5 * length, 0.5 * width),
+        (-0.5 * length, 0.5 * width),
+        (-0.5 * length, -0.5 * width),
+        (0.5 * length, -0.5 * width),
+        (0.75 * length, 0.0),
+    ]

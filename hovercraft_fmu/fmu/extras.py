@@ -12,6 +12,8 @@ LS_REF, LS_MANIFEST = "org.fmi-standard.fmi-ls-ref", "http://fmi-standard.org/fm
 register_namespace("fmi-ls", LS_MANIFEST)
 RESULT = Path(__file__).parent / "extra" / "out.csv"
 """As `studies/pages.py` wrote it, from a run of the native FMU: its bits depend on no machine."""
+ICON = Path(__file__).with_name("icon.png")
+"""The craft from above, 128 x 128."""
 ICON_SIZE, ICON_MM = 100.0, 20.0
 """Width and height of the icon, in units of the diagram and in mm."""
 

@@ -9,8 +9,7 @@ from .archive import write_archive, zipped
 from .block import patched
 from .description import NATIVE, Flavour, model_description, xml
 from .document import documents, licenses
-from .extras import build_description, reference_result, terminals_and_icons
-from .icon import icon_png
+from .extras import ICON, build_description, reference_result, terminals_and_icons
 from .mach_o import universal
 from .machine_code import OPTIONS, PLATFORMS, block_of, c_file, identity, library, sources
 
@@ -68,9 +67,9 @@ def _archive(flavour: Flavour, papers: Papers, platforms: Iterable[str]) -> byte
         "sources/buildDescription.xml": xml(build_description(flavour, OPTIONS)),
     }
     if flavour.fmi == 2:
-        files["model.png"] = icon_png()
+        files["model.png"] = ICON.read_bytes()
     else:
-        files["terminalsAndIcons/icon.png"] = icon_png()
+        files["terminalsAndIcons/icon.png"] = ICON.read_bytes()
         files["terminalsAndIcons/terminalsAndIcons.xml"] = xml(terminals_and_icons(flavour.model))
     build = identity(flavour)
     return zipped(

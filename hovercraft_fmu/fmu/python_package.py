@@ -11,8 +11,7 @@ import pythonfmu
 from .archive import digest, write_archive, zipped
 from .description import PYTHON, Flavour, model_description, xml
 from .document import documents, licenses
-from .extras import reference_result
-from .icon import icon_png
+from .extras import ICON, reference_result
 
 PACKAGE = Path(__file__).parent.parent
 SHARED = (
@@ -106,7 +105,7 @@ def _archive(content: Content) -> bytes:
     return zipped(
         {
             "modelDescription.xml": xml(model_description(build, flavour)),
-            "model.png": icon_png(),
+            "model.png": ICON.read_bytes(),
             "resources/slavemodule.txt": f"{package}_fmu".encode(),
             f"resources/{package}_fmu.py": entry.encode(),
             f"resources/{package}/__init__.py": b'"""The model of one FMU."""\n',

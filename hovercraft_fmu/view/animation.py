@@ -13,8 +13,7 @@ from PIL import Image, ImageColor
 
 from ..drawing.figures import new_figure
 from ..drawing.palette import FAINT_LINE, INK, JETS, METHODS, OTHER, QUIET, SERIES
-from ..drawing.shapes import Shape, jets, placed
-from ..fmu.icon import outline
+from ..drawing.shapes import Shape, jets, outline, placed
 from ..fmu.near_names import explains_keywords
 from ..simulation import Result, metres
 from ..whole import written

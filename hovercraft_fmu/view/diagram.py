@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from ..drawing.figures import new_figure
 from ..drawing.palette import INK, JETS, QUIET, SEA
-from ..fmu.icon import outline
+from ..drawing.shapes import outline
 from ..model.craft import Craft
 
 if TYPE_CHECKING:

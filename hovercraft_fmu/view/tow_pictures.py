@@ -10,8 +10,7 @@ from PIL import Image
 
 from ..drawing.figures import check_plot, new_figure, save
 from ..drawing.palette import CRAFT, INK, QUIET, SEA, SWAY
-from ..drawing.shapes import placed
-from ..fmu.icon import outline
+from ..drawing.shapes import outline, placed
 from ..towing import Towed
 from ..whole import write_whole, written
 from .animation import Tell, check_animation

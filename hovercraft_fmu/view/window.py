@@ -7,8 +7,7 @@ from math import atan2, cos, degrees, hypot, radians, sin
 from typing import NamedTuple
 
 from ..drawing.palette import FAINT, GRID, GROUND, HULL, PANEL, TEXT, TRAIL, WARNING, WINDOW_JETS
-from ..drawing.shapes import jets
-from ..fmu.icon import outline
+from ..drawing.shapes import jets, outline
 from ..model.craft import Craft
 from ..model.dynamics import Controls
 from .camera import Camera, Point
