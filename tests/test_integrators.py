@@ -44,6 +44,7 @@ def test_order_is_a_slope(name: str, scene: Any) -> None:
         exact = scene.exact(np.array([48.0]))
         errors.append(max(abs(value - float(part[0])) for value, part in zip(end, exact, strict=True)))
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(ORDERS[name], abs=0.1)
+    assert ORDERS[name] == method(name).order
 
 
 @pytest.mark.parametrize("h", [1e-3, 0.1, 10.0])

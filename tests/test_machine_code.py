@@ -2,7 +2,6 @@
 
 import runpy
 import shutil
-import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,10 +13,9 @@ from hovercraft_fmu import cli, libraries
 from hovercraft_fmu.building import PRODUCTS, build
 from hovercraft_fmu.fmu import machine_code
 from hovercraft_fmu.fmu.description import NATIVE, NATIVE3, Flavour
-from hovercraft_fmu.fmu.mach_o import universal
 from hovercraft_fmu.fmu.machine_code import PLATFORMS, Library, NotCompiledError, c_file, compile_all, library
 from hovercraft_fmu.libraries import compile_libraries
-from tests.binaries import dylib, slices
+from tests.binaries import dylib
 
 
 @pytest.fixture
@@ -83,14 +81,6 @@ def test_each_system_gets_what_it_asks_of_a_library() -> None:
     assert reason == tiny.missing == ""
     assert tiny.path("x86_64-windows").read_bytes()[:2] == b"MZ"
     assert dylib(tiny.path("aarch64-darwin").read_bytes()).name == "@rpath/Tiny.dylib"
-
-
-def test_a_universal_file_has_every_slice_as_it_was() -> None:
-    """Of any length and kind; each begins on a page (Apple, `mach-o/fat.h`)."""
-    parts = [struct.pack("<3I", 0xFEEDFACF, *kind) + b"#" * size for kind, size in (((7, 3), 5), ((12, 2), 1 << 14))]
-    made = universal(parts)
-    assert slices(made) == parts
-    assert [made.index(part) % (1 << 14) for part in parts] == [0, 0]
 
 
 def test_a_file_of_c_that_is_not_there() -> None:

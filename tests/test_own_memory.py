@@ -15,7 +15,7 @@ from tests.native import C_TESTS, compile_c
 PAGES, PAGE, HEAD = 16, 65536, 16
 """Of own_memory.h, all that there is; and bytes that a block takes beside its own."""
 TYPES: dict[str, tuple[Any, ...]] = {
-    "memory_allocate": (c_void_p, c_size_t, c_size_t), "memory_release": (None, c_void_p),
+    "memory_allocate": (c_void_p, c_size_t), "memory_release": (None, c_void_p),
     "own_memcpy": (c_void_p, c_void_p, c_char_p, c_size_t), "own_memset": (c_void_p, c_void_p, c_int, c_size_t),
     "own_memcmp": (c_int, c_char_p, c_char_p, c_size_t), "own_strlen": (c_size_t, c_char_p),
     "own_strcmp": (c_int, c_char_p, c_char_p),
@@ -84,37 +84,37 @@ def test_strings(library: Any, both: bytes, one: bytes, other: bytes) -> None:
 @pytest.mark.parametrize(("size", "most"), [(PAGE - HEAD, PAGES), (PAGE - HEAD + 1, PAGES // 2)])
 def test_memory_is_zero_and_each_blocks_own(size: int, most: int, untouched: Any) -> None:
     """Whole pages, as many as there are; the one behind says so. What comes back is zero again, the rest stays."""
-    blocks = [untouched.memory_allocate(1, size) for _ in range(most)]
+    blocks = [untouched.memory_allocate(size) for _ in range(most)]
     assert all(blocks)
-    assert untouched.memory_allocate(1, size) is None
+    assert untouched.memory_allocate(size) is None
     for number, block in enumerate(blocks, 1):
         assert string_at(block, size) == bytes(size)
         memset(block, number, size)
     for number in (3, 1, 5):
         untouched.memory_release(blocks[number])
     for _ in range(3):
-        blocks.append(untouched.memory_allocate(size, 1))
+        blocks.append(untouched.memory_allocate(size))
         assert string_at(blocks[-1], size) == bytes(size)
     assert sorted(blocks[-3:]) == sorted(blocks[number] for number in (1, 3, 5))
-    assert untouched.memory_allocate(1, 1) is None
+    assert untouched.memory_allocate(1) is None
     kept = [number for number in range(most) if number not in (1, 3, 5)]
     assert all(string_at(blocks[number], size) == bytes([number + 1]) * size for number in kept)
 
 
 def test_what_was_given_back_is_large_enough(untouched: Any) -> None:
     """For what it was made for, not for more; no memory at all can be given back, too."""
-    small, large = (untouched.memory_allocate(pages, PAGE - HEAD // pages) for pages in (1, 2))
+    small, large = (untouched.memory_allocate(pages * PAGE - HEAD) for pages in (1, 2))
     for block in (small, large, None):
         untouched.memory_release(block)
-    assert untouched.memory_allocate(1, 2 * PAGE - HEAD) == large
-    assert untouched.memory_allocate(1, PAGE) not in (small, None)
-    assert untouched.memory_allocate(1, 2) == small
+    assert untouched.memory_allocate(2 * PAGE - HEAD) == large
+    assert untouched.memory_allocate(PAGE) not in (small, None)
+    assert untouched.memory_allocate(2) == small
 
 
 def test_a_block_that_is_made_again_and_again_takes_no_more(untouched: Any) -> None:
-    first = untouched.memory_allocate(1000, 8)
+    first = untouched.memory_allocate(8000)
     for _ in range(1000):
         untouched.memory_release(first)
-        assert untouched.memory_allocate(1000, 8) == first
-    assert untouched.memory_allocate(1, 2 * PAGE * PAGES) is None
-    assert untouched.memory_allocate(PAGES - 2, PAGE)
+        assert untouched.memory_allocate(8000) == first
+    assert untouched.memory_allocate(2 * PAGE * PAGES) is None
+    assert untouched.memory_allocate((PAGES - 2) * PAGE)

@@ -306,17 +306,24 @@ def _of_c_body(source: str, bare: str, start: int, end: int) -> Iterator[Change]
             yield from _exchanged(source, "arguments", _arguments(bare, *found.span("arguments")))
 
 
+ASSIGNED = re.compile(r"([\w.>-]+)(\[[^\]]*\])? [-+*/|&^]?= ")
+NAME = re.compile(r"(\.|->)?\b([A-Za-z_]\w*)")
+
+
 def _c_depends(one: str, other: str) -> bool:
-    def is_set(text: str) -> set[str]:
-        return {
-            name.split(".")[-1].split(">")[-1]
-            for name in re.findall(r"([\w.>-]+)(?:\[[^\]]*\])? (?:[-+*/|&^]?=) ", text)
-        }
+    """Whether one reads what the other sets, or both set the same; a member is another name than a variable."""
 
-    def read(text: str) -> set[str]:
-        return set(re.findall(r"[A-Za-z_]\w*", text))
+    def names(text: str) -> set[tuple[bool, str]]:
+        return {(bool(found[1]), found[2]) for found in NAME.finditer(text)}
 
-    return bool(is_set(one) & read(other) or is_set(other) & read(one))
+    def is_set(text: str) -> set[tuple[bool, str]]:
+        return {max(names(found[1]), key=lambda name: found[1].rindex(name[1])) for found in ASSIGNED.finditer(text)}
+
+    def read(text: str) -> set[tuple[bool, str]]:
+        return names(ASSIGNED.sub(lambda found: f" {found[2] or ''} ", text))
+
+    same = {found[0] for found in ASSIGNED.finditer(one)} & {found[0] for found in ASSIGNED.finditer(other)}
+    return bool(is_set(one) & read(other) or is_set(other) & read(one) or same)
 
 
 def _arguments(bare: str, start: int, end: int) -> list[tuple[int, int]]:

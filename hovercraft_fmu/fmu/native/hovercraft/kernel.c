@@ -825,10 +825,10 @@ static const double WEIGHTS[STAGES - 1][STAGES - 1] = {
     {35.0 / 384, 0.0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84},
 };
 /* Where in the step a stage lies. */
-static const double NODES[STAGES - 1] = {1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1.0, 1.0};
+static const double NODES[] = {1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1.0, 1.0};
 /* Fifth order minus fourth order. */
-static const double ERROR[STAGES] = {71.0 / 57600,      0.0,         -71.0 / 16695, 71.0 / 1920,
-                                     -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
+static const double ERROR[] = {71.0 / 57600,       0.0,        -71.0 / 16695, 71.0 / 1920,
+                               -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
 
 static void components_of(const struct state *s, double y[COMPONENTS])
 {

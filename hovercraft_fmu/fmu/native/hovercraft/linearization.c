@@ -183,7 +183,7 @@ static void parameters_at(struct point p, struct linearization *linearization)
     if (craft->skirt_friction == 0.0 && skirt_at(&p) == 0.0)
         slip_at(&p, x, y, p.skirt.radius * yaw);
     for (int known = KNOWN_COUNT; known < INITIAL_KNOWN_COUNT; known++) {
-        struct craft d_craft = {.drag_area = 0};
+        struct craft d_craft = {0};
         *(double *)(void *)((char *)&d_craft + CRAFT_REALS[known - KNOWN_COUNT]) = 1.0;
         const struct derived derived = change_of_derived(craft, &d_craft);
         const struct loads d_loads = change_of_craft(&p, &held, &d_craft, &derived);

@@ -43,7 +43,7 @@ static void tell(void *sink, enum verdict verdict, const char *category, const c
 static void *allocate(void *sink, size_t size)
 {
     (void)sink;
-    return memory_allocate(1, size);
+    return memory_allocate(size);
 }
 
 static void release(void *sink, void *memory)
@@ -90,7 +90,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 {
     static const fmi2CallbackFunctions none = {NULL, NULL, NULL, NULL, NULL};
     const size_t length = name ? strlen(name) : 0;
-    struct component *c = memory_allocate(1, sizeof *c + length + 1);
+    struct component *c = memory_allocate(sizeof *c + length + 1);
     if (!c) {
         if (functions && functions->logger)
             functions->logger(functions->componentEnvironment, name ? name : "", fmi2Error, "logStatusError",

@@ -41,7 +41,7 @@ static void tell(void *sink, enum verdict verdict, const char *category, const c
 
 static void *allocate(void *sink, size_t size)
 {
-    return memory_allocate(1, size);
+    return memory_allocate(size);
 }
 
 static void release(void *sink, void *memory)
@@ -89,7 +89,7 @@ static bool is_acceptable(struct instance *instance, fmi3String token)
 static struct component *made(enum use use, fmi3String token, bool logging, fmi3InstanceEnvironment environment,
                               fmi3LogMessageCallback log)
 {
-    struct component *c = memory_allocate(1, sizeof *c);
+    struct component *c = memory_allocate(sizeof *c);
     if (!c) {
         if (log)
             log(environment, fmi3Error, "logStatusError", "fmi3Instantiate: no memory");

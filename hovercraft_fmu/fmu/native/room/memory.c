@@ -7,9 +7,9 @@
 
 #include <stdlib.h>
 
-void *memory_allocate(size_t count, size_t size)
+void *memory_allocate(size_t size)
 {
-    return calloc(count, size);
+    return calloc(1, size);
 }
 
 void memory_release(void *memory)
@@ -50,10 +50,10 @@ static struct block *block_of(size_t size)
     return block;
 }
 
-void *memory_allocate(size_t count, size_t size)
+void *memory_allocate(size_t size)
 {
-    struct block *block = block_of(sizeof *block + count * size);
-    return block ? memset(block + 1, 0, count * size) : NULL;
+    struct block *block = block_of(sizeof *block + size);
+    return block ? memset(block + 1, 0, size) : NULL;
 }
 
 void memory_release(void *memory)
@@ -82,9 +82,9 @@ int __stdcall DllMain(void *library, unsigned long reason, void *reserved)
     return 1;
 }
 
-void *memory_allocate(size_t count, size_t size)
+void *memory_allocate(size_t size)
 {
-    return HeapAlloc(GetProcessHeap(), HEAP_ZERO_MEMORY, count * size);
+    return HeapAlloc(GetProcessHeap(), HEAP_ZERO_MEMORY, size);
 }
 
 void memory_release(void *memory)

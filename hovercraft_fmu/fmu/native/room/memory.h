@@ -8,7 +8,7 @@
 #include "hidden.h"
 
 /* As calloc and free. */
-HIDDEN void *memory_allocate(size_t count, size_t size);
+HIDDEN void *memory_allocate(size_t size);
 HIDDEN void memory_release(void *memory);
 
 #endif
