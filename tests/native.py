@@ -195,6 +195,11 @@ class Kernel:
         """As in subcycling.py."""
         return float(self.library.kernel_meant_step(*arguments))
 
+    def too_strong(self, controls: Controls, craft: Craft) -> str | None:
+        """As in subcycling.py."""
+        place = int(self.library.kernel_too_strong(byref(CControls(*controls)), byref(CCraft(*astuple(craft)))))
+        return (*Controls._fields, None)[place]
+
     def loads(self, state: State, controls: Controls, craft: Craft) -> tuple[float, ...]:
         arguments = byref(CState(*state)), byref(CControls(*controls)), byref(CCraft(*astuple(craft)))
         return numbers_of(self.library.kernel_loads_on(*arguments), ("x", "y", "moment", "kq"))

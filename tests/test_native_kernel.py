@@ -19,7 +19,7 @@ from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, load_function, loads, saturate
 from hovercraft_fmu.model.error_estimate import Companion, accompany, estimated_error
 from hovercraft_fmu.model.integrators import INTEGRATORS, Integrator, StepTooSmallError, Stretch
-from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, substeps
+from hovercraft_fmu.model.subcycling import NonFiniteError, Settings, advance, substeps, too_strong
 from hovercraft_fmu.simulation import held_steps, plan
 from tests.native import C_TESTS, SCENES_AND_METHODS, STEPS, Kernel, Text, compile_c
 from tests.strategies import calm_crafts, controls, crafts, numbers, states
@@ -241,6 +241,18 @@ def test_a_long_step_is_two_shorter_ones(method: str, friction: float, libm: Ker
     assert whole.state == second.state
     assert whole.stability == max(first.stability, second.stability)
     assert whole.rotation == max(first.rotation, second.rotation)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("name", ["wind_x", "wind_y", "external_force_x", "external_force_y", "external_moment"])
+def test_an_input_is_too_strong_from_one_speed_on(name: str, sign: float, libm: Kernel) -> None:
+    """Where a step of 1e-12 s is as long as drag takes, 1/(2 k q (1/m + x_d^2/I)); a force leads to q = sqrt(F/k)."""
+    k = 0.5 * 1.225 * 1.25 * 75.0
+    q = 1.0 / (1e-12 * k * 2.0 * (1.0 / 100.0 + 25.0 / 500.0))
+    limit = q if name.startswith("wind") else k * q * q * (20.0 if name == "external_moment" else 1.0)
+    for strong, expected in ((0.999, None), (1.001, name)):
+        held = Controls()._replace(**{name: sign * strong * limit})
+        assert [rule(held, Craft()) for rule in (too_strong, libm.too_strong)] == [expected] * 2
 
 
 # ---- ramps, which the Python model does not have

@@ -99,6 +99,13 @@ def test_no_more_than_the_rounding_of_the_time_is_taken_from_a_step(
     assert abs(Fraction(meant) - Fraction(step)) <= min(8 * Fraction(math.ulp(largest)), Fraction(step) / 9)
 
 
+def test_the_end_of_a_step_is_one_of_its_times(kernel: Kernel) -> None:
+    """At 1 s a step of 1 s and a little is 1 s, as the end, at 2 s, may round by that much; at 0 s it is not."""
+    step = 1.0 + 6 * math.ulp(1.0)
+    for rule in (meant_step, kernel.meant_step):
+        assert [rule(time, step, 0.0, 0.5) for time in (0.0, 1.0, -1.0)] == [step, 1.0, step]
+
+
 def test_a_day_of_milliseconds_and_a_year_of_seconds_keep_their_count(kernel: Kernel) -> None:
     """All the step counts in which a rounding could go wrong: about powers of two, and many between them."""
     day, year = 86_400_000, 31_536_000

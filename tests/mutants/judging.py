@@ -49,7 +49,8 @@ OTHERS = (*("autopilot", "fleet", "guidance", "tether"), "every", "letter", "mac
 NOT_OF_C = ("craft", "dynamics", "folding", "identity", "integrators", "interface", "subcycling")
 """Test files that run no native FMU, or of which other ones say more."""
 LIKELY = {
-    "kernel.c": "native_kernel", "linearization.c": "partial_derivatives", "partials.c": "partial_derivatives",
+    "kernel.c": "native_kernel same_time", "linearization.c": "partial_derivatives",
+    "partials.c": "partial_derivatives",
     "exchange.c": "exchange", "serialize.c": "lifecycle native", "text.c": "native_kernel", "fmi2.c": "lifecycle calls",
     "fmi3.c": "fmi3 intermediate_update", "hovercraft.c": "native error_estimate", "variant.c": "variants",
     "rates.c": "native fmi3", "step.c": "lifecycle intermediate_update", "messages.c": "fmi3 lifecycle",
