@@ -170,6 +170,8 @@ def test_what_is_inside(fmu: Path) -> None:
         names = set(archive.namelist())
         page = archive.read("documentation/index.html").decode()
         icon = archive.read("model.png")
+        modes = {(each.create_system, each.external_attr >> 16) for each in archive.infolist()}
+    assert modes == {(3, 0o644)}  # Unix's, wherever it was built
     assert {
         "modelDescription.xml",
         "documentation/externalDependencies.txt",

@@ -1,8 +1,10 @@
 """What is promised of each method: order, exactness, energy, error control."""
 
+import csv
 import itertools
 import math
 import random
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,11 @@ import pytest
 from hypothesis import given, reject
 from hypothesis import strategies as st
 
+import hovercraft_fmu
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import (
+    ADAPTIVE,
     INTEGRATORS,
     StepTooSmallError,
     integrator,
@@ -25,6 +29,7 @@ from tests.strategies import calm_crafts, controls, crafts, numbers, rubbing_cra
 from tests.test_scenes import EXACT, NAMES
 
 NONE = Controls(0.0, 0.0, 0.0)
+TABLES = Path(hovercraft_fmu.__file__).parent / "studies" / "results"
 FIXED = [method for method in INTEGRATORS if method.integrate]
 ORDERS = {"semi_implicit_euler": 1.0, "drag_implicit": 1.0, "rk4": 4.0, "splitting": 2.0}
 
@@ -197,6 +202,17 @@ def test_drag_implicit_solves_its_equations(craft: Craft, state: State, asked: C
     end = advance(state, asked, craft, h, Settings(h, method("drag_implicit"))).state
     scale = np.abs([*state[3:], *wind]).max() + h * np.abs(push).max() / min(craft.mass, craft.inertia)
     assert end[3:] == pytest.approx(expected, rel=0.0, abs=1e-9 * scale)  # the condition of the system is up to 1e6
+
+
+def test_the_limits_of_the_warnings_are_those_that_were_measured() -> None:
+    """As `hovercraft-fmu measure stability` wrote them, of each method with a fixed step."""
+    with (TABLES / "warnings.csv").open(encoding="utf-8") as file:
+        rows = {row["method"]: row for row in csv.DictReader(file)}
+    assert rows.keys() == {each.name for each in FIXED} == {each.name for each in INTEGRATORS} - {"adaptive"}
+    for each in FIXED:
+        limits = [float(rows[each.name][name]) for name in ("stability_limit", "rotation_limit")]
+        assert limits == [each.stability_limit, each.rotation_limit]
+    assert method("adaptive") is ADAPTIVE
 
 
 @pytest.mark.parametrize("scene", EXACT, ids=NAMES)

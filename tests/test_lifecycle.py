@@ -830,6 +830,16 @@ def test_the_watched_values_are_those_of_the_fastest_substep(instance: Any) -> N
     assert get(instance, "stability_number", "rotation_per_substep") == pytest.approx([0.0, 0.0003], rel=1e-12)
 
 
+def test_at_the_limit_itself_nothing_is_warned_of(instance: Any, messages: list[str]) -> None:
+    """Half a second at 0.3 rad/s is 0.15 rad, the limit of rotation, without a rounding."""
+    for rate, warned in ((0.3, 0), (math.nextafter(0.3, 1.0), STEP_TURNS)):
+        instance.reset()
+        start(instance, velocity__yaw_rate=rate, step_size=0.5, thrust=0.0, drag_coefficient=0.0)
+        instance.doStep(0.0, 0.5)
+        assert count(instance, "warnings") == warned
+    assert len(messages) == 1
+
+
 def test_ground_and_wind_change_between_steps_and_come_back_with_the_state(instance: Any) -> None:
     start(instance, velocity__x=1.0)
     put(instance, thrust=0.0, skirt_friction=0.1, rotational_drag=0.3, wind__y=0.2)

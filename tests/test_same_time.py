@@ -104,6 +104,8 @@ def test_the_end_of_a_step_is_one_of_its_times(kernel: Kernel) -> None:
     step = 1.0 + 6 * math.ulp(1.0)
     for rule in (meant_step, kernel.meant_step):
         assert [rule(time, step, 0.0, 0.5) for time in (0.0, 1.0, -1.0)] == [step, 1.0, step]
+        steps = [1.0 + n * math.ulp(1.0) for n in (4, 5)]  # the rounding of 1 s, and more
+        assert [rule(-1.0, each, 0.0, 0.5) for each in steps] == [1.0, steps[1]]
 
 
 def test_a_day_of_milliseconds_and_a_year_of_seconds_keep_their_count(kernel: Kernel) -> None:
