@@ -11,6 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 
+from hovercraft_fmu.fmu.document import FOLDER
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, WATCHED
 from hovercraft_fmu.host import SimulationError
 from hovercraft_fmu.model.dynamics import Controls, State
@@ -183,6 +184,9 @@ def test_what_is_inside(fmu: Path) -> None:
     assert icon.startswith(b"\x89PNG")
     assert all(f"<code>{name}</code>" in page for name in BY_NAME)
     assert "LD_PRELOAD" in page
+    rows = (FOLDER / "checked.md").read_text(encoding="utf-8").splitlines()[2:]
+    assert len(rows) > 5
+    assert all(f"<td>{row.split('|')[1].strip()}</td>" in page for row in rows)
     assert not [name for name in names if "__pycache__" in name or name.startswith("/")]
 
 

@@ -126,6 +126,13 @@ def test_a_unit_is_what_its_name_says(xml: Any) -> None:
     }
 
 
+def test_nominals_are_sizes(description: Any) -> None:
+    """What a solver scales by."""
+    nominals = [float(v.nominal) for v in description.modelVariables if v.nominal is not None]
+    assert len(nominals) > 10
+    assert min(nominals) > 0.0
+
+
 def test_a_type_says_its_quantity(xml: Any) -> None:
     types = [node for each in xml.iter("SimpleType") for node in each]
     assert {node.tag for node in types} == {"Real", "Enumeration"}

@@ -376,7 +376,7 @@ class Known:
         for test, cost in self.costs.items():
             name = module(test).removeprefix("test_")
             if is_c:
-                runs_it = not covering or test.split("::")[0] in covering
+                runs_it = not covering or name in likely or test.split("::")[0] in covering
                 is_apt = runs_it and name not in (*NOT_OF_C, *ANEW) and "[python" not in test
             else:
                 is_apt = share == 1.0 or name not in ANEW
