@@ -133,6 +133,12 @@ def test_nominals_are_sizes(description: Any) -> None:
     assert min(nominals) > 0.0
 
 
+def test_an_enumeration_has_the_limits_of_its_items() -> None:
+    chosen = [v for v in VARIABLES if v.enumeration]
+    assert len(chosen) > 2
+    assert all((v.minimum, v.maximum) == (1, len(v.enumeration.items)) for v in chosen if v.enumeration)
+
+
 def test_a_type_says_its_quantity(xml: Any) -> None:
     types = [node for each in xml.iter("SimpleType") for node in each]
     assert {node.tag for node in types} == {"Real", "Enumeration"}
