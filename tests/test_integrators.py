@@ -229,6 +229,18 @@ def test_the_error_of_adaptive_falls_with_its_tolerance(scene: Any) -> None:
     assert np.polyfit(np.log(tolerances), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.3)
 
 
+def test_a_step_of_adaptive_errs_by_one_order_more_than_a_run() -> None:
+    scene = next(each for each in EXACT if each.name == "cycloid")
+    errors = []
+    for h in (1.0, 0.5):
+        how = Settings(h, method("adaptive"), 1e3)
+        made = advance(scene.start, Controls(*scene.rows[0][1:]), scene.craft, h, how)
+        assert made.substeps == 1
+        pairs = zip(made.state, scene.exact(np.array([h])), strict=True)
+        errors.append(max(abs(value - float(part[0])) for value, part in pairs))
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(method("adaptive").order + 1, abs=0.1)
+
+
 def test_adaptive_does_not_depend_on_where_the_craft_is() -> None:
     ends = []
     for x in (0.0, 2.0**20):  # a power of two, so that the far craft's position has its bits, too
