@@ -231,6 +231,7 @@ def test_the_error_of_adaptive_falls_with_its_tolerance(scene: Any) -> None:
 
 def test_a_step_of_adaptive_errs_by_one_order_more_than_a_run() -> None:
     scene = next(each for each in EXACT if each.name == "cycloid")
+    assert scene.exact
     errors = []
     for h in (1.0, 0.5):
         how = Settings(h, method("adaptive"), 1e3)
