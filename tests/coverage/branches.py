@@ -66,7 +66,9 @@ def closing_lines(taken: Taken, exceptions: Sequence[Exempt], goal: Sequence[str
             ]
     if len(exceptions) > AT_MOST:
         wrong.append(f"{len(exceptions)} exceptions: must be at most {AT_MOST}")
-    total = f"{sum(taken.values())} of {len(taken)} branches in {len(files)} files"
+    aimed = [was for branch, was in taken.items() if branch.file.startswith(tuple(goal))]
+    all_taken = f"{sum(taken.values())} of {len(taken)} in {len(files)} files"
+    total = f"{sum(aimed)} of {len(aimed)} branches of the goal; {all_taken}"
     return [*lines, *wrong, f"{total}; {len(wrong)} to be mended" if wrong else total], not wrong
 
 
