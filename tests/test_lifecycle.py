@@ -26,6 +26,7 @@ from hovercraft_fmu.fmu.interface import (
     STEP_TURNS,
     STEP_UNSTABLE,
     SUBSTEPS_MAX,
+    VARIABLES,
 )
 from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
@@ -34,7 +35,7 @@ from hovercraft_fmu.model.observation import observe_action, observe_motion
 from hovercraft_fmu.model.subcycling import Settings, advance, rounding
 from hovercraft_fmu.scenes import SCENES
 from tests.blobs import with_build, with_substeps
-from tests.conftest import Fresh
+from tests.conftest import ROOT, Fresh
 from tests.lowlevel import (
     CONTINUOUS,
     another,
@@ -867,6 +868,53 @@ def test_the_default_time_may_be_off_by_a_rounding(instance: Any) -> None:
         time += 0.1
     assert count(instance) == 100 * 1000
     instance.doStep(100.0, 0.1)
+
+
+def test_a_state_from_before_the_start_brings_its_start_values_back(instance: Any) -> None:
+    """All of them, those of the motion, too: the start takes them up."""
+    values = {"pose__x": 7.0, "velocity__yaw_rate": 0.25, "mass": 120.0, "thrust": 3.0}
+    put(instance, **values)
+    content = instance.serializeFMUstate(instance.getFMUstate())
+    instance.reset()
+    instance.setFMUstate(instance.deSerializeFMUstate(content))
+    start(instance)
+    assert get(instance, *(name.replace("__", ".") for name in values)) == list(values.values())
+
+
+LIMITED = [(v.name, limit, way) for v in VARIABLES if v.causality == "parameter" and v.kind == "Real"
+           for limit, way in ((v.minimum, -math.inf), (v.maximum, math.inf)) if limit is not None]  # fmt: skip
+"""Of each parameter that has limits in the description the limit, and where it is left."""
+
+
+@pytest.mark.parametrize(("name", "limit", "way"), LIMITED)
+def test_a_parameter_may_be_at_its_limit_and_not_beyond(
+    name: str, limit: float, way: float, instance: Any, messages: list[str]
+) -> None:
+    instance.setReal([reference(name)], [limit])
+    instance.reset()
+    with pytest.raises(FMICallException):
+        instance.setReal([reference(name)], [math.nextafter(limit, way)])
+    assert messages[-1].startswith(f"{name} = ")
+
+
+def test_states_that_are_given_back_leave_nothing(each_native_fmu: Path, fresh: Fresh) -> None:
+    """Forty thousand of some kilobytes each, in a process of its own."""
+    code = """
+import sys
+from pathlib import Path
+import psutil
+from tests.lowlevel import one, start
+
+with one(Path(sys.argv[1])) as (instance, _):
+    start(instance)
+    rss = psutil.Process().memory_info
+    for k in range(40_000):
+        if k == 4_000:
+            early = rss().rss
+        instance.freeFMUstate(instance.getFMUstate())
+    print(rss().rss - early)
+"""
+    assert int(fresh(code, each_native_fmu, env={"PYTHONPATH": str(ROOT)})) < 10e6
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
