@@ -27,6 +27,7 @@ from tests.blobs import SUBSTEPS, signed, with_word
 from tests.conftest import FMI_2
 from tests.exchange import (
     EVERYWHERE,
+    KNOWNS,
     get_vector,
     go,
     jacobian,
@@ -527,3 +528,17 @@ def test_the_model_structure(description: Any) -> None:
     assert description.modelExchange.canSerializeFMUstate
     initial = {unknown.variable.name for unknown in description.initialUnknowns}
     assert initial == {*MOTION, *DERIVATIVES[3:], *ERRORS, "projected_area"}
+
+
+def test_a_derivative_follows_what_the_description_says_and_nothing_else(description: Any, instance: Any) -> None:
+    """Of states and inputs those for which its partial derivative is another number than 0 somewhere."""
+    followed: dict[str, set[str]] = {name: set() for name in DERIVATIVES}
+    state = State(3.0, -2.0, 0.7, 2.0, -0.5, 0.1)
+    asked = Controls(5.0, 0.3, 0.6, 0.2, -0.3, 1.0, 2.0, 3.0)
+    for craft in (Craft(), Craft(drag_area=2, rotational_drag=0.4)):
+        put_all(instance, craft, state, asked)
+        for name, row in zip(DERIVATIVES, jacobian(instance, DERIVATIVES, KNOWNS), strict=True):
+            followed[name] |= {known for known, slope in zip(KNOWNS, row, strict=True) if slope != 0.0}
+    said = {each.variable.name: {known.name for known in each.dependencies} for each in description.derivatives}
+    said = {name: known & {*KNOWNS} for name, known in said.items()}  # FMI 3.0 has tunable parameters there, too
+    assert followed == said
