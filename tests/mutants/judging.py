@@ -472,7 +472,7 @@ def judge(tree: Path, mutants: Iterator[Mutant], known: Known, record: Record) -
     """
     left = tree / "left.pickle"
 
-    def serve(session: pytest.Session, running: Running) -> None:
+    def serve(told: IO[str], session: pytest.Session, running: Running) -> None:
         waiting = []
         compiled = prepared(tree)
         compiled(True)
@@ -488,7 +488,9 @@ def judge(tree: Path, mutants: Iterator[Mutant], known: Known, record: Record) -
                 return True
             return in_fork(lambda told: running.run([items[test]], known.costs, told))[0] == SURVIVED
 
-        _require(in_fork(lambda told: run(known.cheapest(), False, told)))
+        before = in_fork(lambda each: run(known.cheapest(), False, each))
+        print(before[1], file=told, flush=True)
+        _require(before)
         for mutant in mutants:
             known.learn()
             judged = _exchanged if mutant.file.endswith(".py") else _compiled
@@ -503,7 +505,7 @@ def judge(tree: Path, mutants: Iterator[Mutant], known: Known, record: Record) -
         left.write_bytes(pickle.dumps(waiting))
 
     files = sorted(name for name in {module(test) for test in known.costs} if name.removeprefix("test_") not in ANEW)
-    _require(in_fork(lambda _: run_pytest(tree, files, serve) == 0 and left.exists(), 1e9))
+    _require(in_fork(lambda told: run_pytest(tree, files, partial(serve, told)) == 0 and left.exists(), 1e9))
     waiting = pickle.loads(left.read_bytes())
     left.unlink()
     if waiting:
