@@ -246,11 +246,11 @@ def test_of_the_adaptive_method_it_is_the_tolerance_that_is_too_large(each_fmu: 
 
 
 def test_a_stop_within_a_few_substeps_cannot_be_trusted(each_fmu: Path) -> None:
-    """Slower than friction takes away in a sub-step, craft and companion stop at once, each where it was: no
-    difference, and off by v0^2/(2*mu*g). A stop after many sub-steps can be trusted, and so can a launch.
+    """Slower than friction takes away in half a sub-step, 0.098 m/s, craft and companion stop at once, each where it
+    was: no difference, and off by v0^2/(2*mu*g). A stop after many sub-steps can be trusted, and so can a launch.
     """
     with one(each_fmu) as (instance, messages):
-        for speed, thrust, trusted in ((0.15, 0.0, False), (6.0, 0.0, True), (0.0, 30.0, True)):
+        for speed, thrust, trusted in ((0.09, 0.0, False), (0.15, 0.0, False), (6.0, 0.0, True), (0.0, 30.0, True)):
             instance.reset()
             begin(instance, "drag_implicit", step_size=1.0, skirt_friction=0.02, drag_coefficient=0.0, inertia=2e4,
                   thrust=thrust, thrust_max=30.0, velocity__x=speed)  # fmt: skip

@@ -1,19 +1,25 @@
 """The FMU as a host sees it, in processes of its own."""
 
+import io
 import json
+import re
 import sysconfig
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
+from fmpy.model_description import read_model_description
 
+from hovercraft_fmu.fmu.archive import zipped
 from hovercraft_fmu.fmu.document import FOLDER
 from hovercraft_fmu.fmu.interface import ACTION, BY_NAME, INPUTS, MOTION, STATES, WATCHED
 from hovercraft_fmu.host import SimulationError
+from hovercraft_fmu.model.craft import Craft
 from hovercraft_fmu.model.dynamics import Controls, State
 from hovercraft_fmu.scenes import SCENES
 from hovercraft_fmu.simulation import Run, holding, plan, run_fmu, run_model
@@ -188,6 +194,41 @@ def test_what_is_inside(fmu: Path) -> None:
     assert len(rows) > 5
     assert all(f"<td>{row.split('|')[1].strip()}</td>" in page for row in rows)
     assert not [name for name in names if "__pycache__" in name or name.startswith("/")]
+
+
+def test_an_archive_is_unix_s_where_it_is_built_on_windows_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zipfile, "sys", SimpleNamespace(platform="win32"))
+    assert zipfile.ZipInfo("of zipfile").create_system == 0
+    with zipfile.ZipFile(io.BytesIO(zipped({"one": b"1"}))) as archive:
+        assert [each.create_system for each in archive.infolist()] == [3]
+
+
+def test_variables_stand_on_the_page_beside_those_that_people_look_for_with_them(each_fmu: Path) -> None:
+    """By what stands before the dot, as terminals have them; without one by what they are for."""
+    with zipfile.ZipFile(each_fmu) as archive:
+        page = archive.read("documentation/index.html").decode()
+    found = {}
+    for part in page.split('<tr><th colspan="8">')[1:]:
+        heading, rest = part.split("</th>", 1)
+        for name in re.findall(r"<tr><td><code>(.*?)</code></td>", rest):
+            assert name not in found
+            found[name] = heading
+
+    def expected(name: str, causality: str) -> str:
+        before, dot, _ = name.rpartition(".")
+        if dot:
+            return "load" if before.startswith("external") else before
+        groups = {
+            "input": "actuators",
+            "output": "outputs",
+            "parameter": "craft" if name in vars(Craft()) else "settings",
+        }
+        return groups.get(causality, "watched")
+
+    variables = read_model_description(str(each_fmu)).modelVariables
+    assert found == {
+        each.name: expected(each.name, each.causality) for each in variables if each.causality != "independent"
+    }
 
 
 # ---- communication points, through the low-level interface

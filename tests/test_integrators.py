@@ -18,6 +18,7 @@ from hovercraft_fmu.model.dynamics import Controls, State, kinetic_energy
 from hovercraft_fmu.model.integrators import (
     ADAPTIVE,
     INTEGRATORS,
+    MAX_TRIED,
     StepTooSmallError,
     integrator,
     integrator_number,
@@ -301,6 +302,7 @@ def test_right_after_a_refused_step_adaptive_does_not_take_a_longer_one(monkeypa
 
 def test_adaptive_that_finds_no_end_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thruster, no drag, a day: 5184 rad/s in the end, and 2e8 rad; of 10^8 steps a test has time for a thousand."""
+    assert MAX_TRIED == 10**8  # which the message says
     monkeypatch.setattr("hovercraft_fmu.model.integrators.MAX_TRIED", 1000)
     with pytest.raises(
         ValueError, match=r"86400.0 s: must not need more than 10\^8 sub-steps to meet tolerance = 1e-06"

@@ -403,11 +403,16 @@ def test_inputs_outside_their_limits_saturate_and_are_told_once(instance: Any, m
     assert count(instance, "warnings") == INPUT_HELD
 
 
-def test_a_rounding_of_the_host_is_no_warning(instance: Any, messages: list[str]) -> None:
+@pytest.mark.parametrize("part", [1e-7, 0.999, 1.001])
+@pytest.mark.parametrize(("name", "limit", "way"), [("thrust", 10.0, HELD), ("port_thruster", 0.0, -HELD)])
+def test_a_rounding_of_the_host_is_no_warning(
+    name: str, limit: float, way: float, part: float, instance: Any, messages: list[str]
+) -> None:
+    """Of a limit, or of 1 where that is less."""
     start(instance)
-    put(instance, thrust=10.000000000000002, port_thruster=-1e-16)
+    put(instance, **{name: limit + part * way * max(1.0, limit)})
     instance.doStep(0.0, 0.1)
-    assert (count(instance, "warnings"), messages) == (0, [])
+    assert (count(instance, "warnings"), len(messages)) == ((INPUT_HELD, 1) if part > 1.0 else (0, 0))
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -3,7 +3,8 @@
 What a run of tests does first, to import libraries and to collect tests, is done once: then a process forks for each
 mutant, and the child runs tests until the first fails. C is compiled for this machine alone, without optimization. A
 function of Python gets its other code where it is; what that does not show is imported anew. Those tests come first
-that noticed most for their time, of the same file above all; a mutant has so much CPU time, then it has survived.
+that noticed most for their time, of the same file above all; a mutant has so much CPU time, then it has survived: or
+of C the suite's sanitized run, which compiles for itself, has the last word.
 """
 
 import ctypes
@@ -25,7 +26,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -61,11 +62,14 @@ LIKELY = {
     "archive.py": "fmu identity", "error_estimate.py": "error_estimate native_kernel",
     "description.py": "fmi3 fmu interface", "interface.py": "interface fmi3", "block.py": "variants",
     "machine_code.py": "machine_code", "start_values.py": "variants", "extras.py": "letter",
-    "document.py": "fmu pages", "native_header.py": "lifecycle native_sources", "wrapper.py": "lifecycle fmu",
+    "native_package.py": "letter", "document.py": "fmu pages",
+    "native_header.py": "lifecycle native_sources", "wrapper.py": "lifecycle fmu",
 }  # fmt: skip
 """Test files that are tried first for a file, as long as nothing is known of it; of others test_lifecycle.py."""
 FIRST = 40
 """Tests that are run one by one, the best first; the rest follows file by file."""
+SANITIZED = "tests/test_native.py::test_clean_under_sanitizers_over_the_life_cycle"
+"""Of C what no other test notices: what is read or written beside memory."""
 TIME_LIMIT = 900.0
 """s, of all tests of a mutant; a test alone has ten times the CPU time it takes, and 4 s."""
 COMPILER = (shutil.which("clang") or "gcc", "-std=c11", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-g0",
@@ -277,7 +281,7 @@ def in_fork(work: Callable[[IO[str]], bool], limit: float = TIME_LIMIT) -> tuple
     child = os.fork()
     if child == 0:
         os.close(read)
-        _alone(work, write)
+        _in_child(work, write)
     os.close(write)
     told, in_time = _heard(child, read, time.monotonic() + limit)
     if not in_time:
@@ -289,7 +293,7 @@ def in_fork(work: Callable[[IO[str]], bool], limit: float = TIME_LIMIT) -> tuple
     return outcome, told, cpu() - began
 
 
-def _alone(work: Callable[[IO[str]], bool], write: int) -> None:
+def _in_child(work: Callable[[IO[str]], bool], write: int) -> None:
     import resource  # Windows has none; the rest of this file is read there, too
 
     code = 1
@@ -622,6 +626,23 @@ def _collected(tree: Path, files: list[str], order: list[str], known: Known, tol
     return fine
 
 
+def _alone(test: str, tree: Path) -> int:
+    """What pytest returns of a test that compiles for itself."""
+    place = str(tree / "temporary" / "alone")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--basetemp", place, test]
+    return subprocess.run(command, cwd=tree, capture_output=True, check=False, timeout=TIME_LIMIT).returncode
+
+
+_passes = cache(_alone)
+
+
+def _is_found_by(test: str, tree: Path, mutant: Mutant) -> bool:
+    """Whether such a test fails, which passes where nothing is changed."""
+    with Change(tree, mutant):
+        found = _alone(test, tree)
+    return found == 1 and _passes(test, tree) == 0
+
+
 def _compiled(tree: Path, mutant: Mutant, known: Known, compiled: Compilation, run: Run) -> Verdict:
     from hovercraft_fmu.fmu.machine_code import COMPILED
 
@@ -641,6 +662,8 @@ def _compiled(tree: Path, mutant: Mutant, known: Known, compiled: Compilation, r
     if outcome == SURVIVED:
         text, code = (found == compiled.units(*options) for found, options in zip(seen, STAGES, strict=True))
         by = ELSEWHERE if text else SAME_CODE if code else ""
+    if outcome == SURVIVED and not by and _is_found_by(SANITIZED, tree, mutant):
+        outcome, by = NOTICED, SANITIZED
     for path in left:
         shutil.rmtree(path) if path.is_dir() else path.unlink()
     return _verdict(mutant, outcome, by, cpu() - began)
