@@ -637,10 +637,16 @@ _passes = cache(_alone)
 
 
 def _is_found_by(test: str, tree: Path, mutant: Mutant) -> bool:
-    """Whether such a test fails, which passes where nothing is changed."""
+    """Whether such a test fails, which passes where nothing is changed. It clears away machine code of others."""
+    from hovercraft_fmu.fmu.machine_code import COMPILED
+
+    kept = shutil.copytree(COMPILED, tree / "kept")
     with Change(tree, mutant):
         found = _alone(test, tree)
-    return found == 1 and _passes(test, tree) == 0
+    noticed = found == 1 and _passes(test, tree) == 0
+    shutil.rmtree(COMPILED)
+    kept.rename(COMPILED)
+    return noticed
 
 
 def _compiled(tree: Path, mutant: Mutant, known: Known, compiled: Compilation, run: Run) -> Verdict:
@@ -662,8 +668,8 @@ def _compiled(tree: Path, mutant: Mutant, known: Known, compiled: Compilation, r
     if outcome == SURVIVED:
         text, code = (found == compiled.units(*options) for found, options in zip(seen, STAGES, strict=True))
         by = ELSEWHERE if text else SAME_CODE if code else ""
-    if outcome == SURVIVED and not by and _is_found_by(SANITIZED, tree, mutant):
-        outcome, by = NOTICED, SANITIZED
     for path in left:
         shutil.rmtree(path) if path.is_dir() else path.unlink()
+    if outcome == SURVIVED and not by and _is_found_by(SANITIZED, tree, mutant):
+        outcome, by = NOTICED, SANITIZED
     return _verdict(mutant, outcome, by, cpu() - began)
