@@ -628,7 +628,7 @@ def _collected(tree: Path, files: list[str], order: list[str], known: Known, tol
 
 def _alone(test: str, tree: Path) -> int:
     """What pytest returns of a test that compiles for itself."""
-    place = str(tree / "temporary" / "alone")
+    place = str(tree / "alone")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--basetemp", place, test]
     return subprocess.run(command, cwd=tree, capture_output=True, check=False, timeout=TIME_LIMIT).returncode
 
