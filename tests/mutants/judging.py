@@ -301,7 +301,7 @@ def _in_child(work: Callable[[IO[str]], bool], write: int) -> None:
         os.setsid()
         with suppress(AttributeError):
             ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # on Linux: not longer than its parent
-        resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30))
+        resource.setrlimit(resource.RLIMIT_AS, (8 << 30, resource.getrlimit(resource.RLIMIT_AS)[1]))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         nothing = os.open(os.devnull, os.O_RDWR)
         for descriptor in (0, 1, 2):
@@ -502,6 +502,9 @@ def judge(tree: Path, mutants: Iterator[Mutant], known: Known, record: Record) -
             while verdict and verdict.by in items and not is_sound(verdict.by):
                 del known.costs[verdict.by]
                 verdict = judged(tree, mutant, known, compiled, run)
+            if verdict and not mutant.file.endswith(".py") and (verdict.verdict, verdict.by) == (SURVIVED, ""):
+                print(SANITIZED, file=told, flush=True)
+                verdict = _sanitized(tree, mutant, verdict)
             if verdict:
                 record(verdict)
             else:
@@ -628,25 +631,32 @@ def _collected(tree: Path, files: list[str], order: list[str], known: Known, tol
 
 def _alone(test: str, tree: Path) -> int:
     """What pytest returns of a test that compiles for itself."""
+    import resource
+
     place = str(tree / "alone")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--basetemp", place, test]
-    return subprocess.run(command, cwd=tree, capture_output=True, check=False, timeout=TIME_LIMIT).returncode
+    limit = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (limit[1], limit[1]))  # sanitizers ask for terabytes that they do not use
+    try:
+        return subprocess.run(command, cwd=tree, capture_output=True, check=False, timeout=TIME_LIMIT).returncode
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limit)
 
 
 _passes = cache(_alone)
 
 
-def _is_found_by(test: str, tree: Path, mutant: Mutant) -> bool:
-    """Whether such a test fails, which passes where nothing is changed. It clears away machine code of others."""
+def _sanitized(tree: Path, mutant: Mutant, verdict: Verdict) -> Verdict:
+    """The last word on C that survived. That run clears away machine code of others."""
     from hovercraft_fmu.fmu.machine_code import COMPILED
 
-    kept = shutil.copytree(COMPILED, tree / "kept")
+    began, kept = cpu(), shutil.copytree(COMPILED, tree / "kept")
+    _require((SURVIVED if _passes(SANITIZED, tree) == 0 else NOTICED, SANITIZED, 0.0))
     with Change(tree, mutant):
-        found = _alone(test, tree)
-    noticed = found == 1 and _passes(test, tree) == 0
+        outcome, by = (NOTICED, SANITIZED) if _alone(SANITIZED, tree) else (SURVIVED, "")
     shutil.rmtree(COMPILED)
     kept.rename(COMPILED)
-    return noticed
+    return _verdict(mutant, outcome, by, verdict.seconds + cpu() - began)
 
 
 def _compiled(tree: Path, mutant: Mutant, known: Known, compiled: Compilation, run: Run) -> Verdict:
@@ -670,6 +680,4 @@ def _compiled(tree: Path, mutant: Mutant, known: Known, compiled: Compilation, r
         by = ELSEWHERE if text else SAME_CODE if code else ""
     for path in left:
         shutil.rmtree(path) if path.is_dir() else path.unlink()
-    if outcome == SURVIVED and not by and _is_found_by(SANITIZED, tree, mutant):
-        outcome, by = NOTICED, SANITIZED
     return _verdict(mutant, outcome, by, cpu() - began)
