@@ -141,6 +141,21 @@ def test_a_list_reads_as_one_value_after_the_other(instance: Any, flavour: Flavo
         assert list(get([*references[::-1], *references])) == one_by_one[::-1] + one_by_one
 
 
+def test_what_the_model_works_out_is_refused_by_name_and_value(
+    instance: Any, messages: list[str], flavour: Flavour, model: Model
+) -> None:
+    start(instance)
+    integers = "setInteger" if flavour.fmi == 2 else "setInt32"
+    values = {"Real": ("setReal", 1.5), "Integer": (integers, 3), "Boolean": ("setBoolean", True)}
+    refused = [v for v in model.variables if v.kind in values and v.causality not in ("input", "parameter")]
+    for variable in refused:
+        setter, value = values[variable.kind]
+        with pytest.raises(FMICallException):
+            getattr(instance, setter)([variable.reference], [value])
+        assert messages[-1].startswith(f"{variable.name} = {value!r}: must not be set in state 'step mode' (")
+    assert len(messages) == len(refused) > 2
+
+
 @pytest.mark.parametrize("phase", ["before", "after"])
 def test_there_is_no_step_before_the_start_and_after_the_end(phase: str, instance: Any, messages: list[str]) -> None:
     if phase == "after":

@@ -193,13 +193,18 @@ def test_a_state_of_another_variant_is_refused(ice: Path, each_fmu: Path, flavou
     with one(ice) as (saved, _):
         start(saved, velocity__x=0.25)
         saved.doStep(0.0, 0.5)
-        content = saved.serializeFMUstate(saved.getFMUstate())
+        state = saved.getFMUstate()
+        content = saved.serializeFMUstate(state)
         for foreign in (each_fmu, other):
             with one(foreign) as (instance, messages):
                 before = everything(instance)
                 with pytest.raises(FMICallException):
                     instance.deSerializeFMUstate(content)
-                assert "must be a state of this build" in messages[0]
+                if flavour == "python":  # to C a pointer does not tell whose it is
+                    with pytest.raises(FMICallException):
+                        instance.setFMUstate(state)
+                assert len(messages) == (2 if flavour == "python" else 1)
+                assert all("must be a state of this build" in message for message in messages)
                 assert everything(instance) == before
         with one(same) as (instance, _):
             instance.setFMUstate(instance.deSerializeFMUstate(content))

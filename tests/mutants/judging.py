@@ -60,10 +60,11 @@ LIKELY = {
     "dynamics.py": "dynamics terms native_kernel", "integrators.py": "integrators native_kernel", "craft.py": "craft",
     "subcycling.py": "subcycling same_time interface native_kernel integrators", "variable.py": "interface",
     "archive.py": "fmu identity", "error_estimate.py": "error_estimate native_kernel",
-    "description.py": "fmi3 fmu interface", "interface.py": "interface fmi3", "block.py": "variants",
+    "description.py": "exchange fmi3 fmu interface", "interface.py": "lifecycle interface fmi3", "block.py": "variants",
     "machine_code.py": "machine_code", "start_values.py": "variants", "extras.py": "letter",
     "native_package.py": "letter", "document.py": "fmu pages",
     "native_header.py": "lifecycle native_sources", "wrapper.py": "lifecycle fmu",
+    "life_cycle.py": "lifecycle variants",
 }  # fmt: skip
 """Test files that are tried first for a file, as long as nothing is known of it; of others test_lifecycle.py."""
 FIRST = 40
