@@ -141,6 +141,18 @@ def test_a_list_reads_as_one_value_after_the_other(instance: Any, flavour: Flavo
         assert list(get([*references[::-1], *references])) == one_by_one[::-1] + one_by_one
 
 
+@pytest.mark.parametrize("flavour", FLAVOURS[:2], indirect=True, ids=lambda flavour: flavour.identifier)
+def test_a_boolean_that_is_asked_for_twice_is_told_twice(instance: Any, flavour: Flavour, model: Model) -> None:
+    count, x, y, arrived = (
+        [model.by_name[name].reference] for name in ("waypoint_count", "waypoint[1].x", "waypoint[1].y", "arrived")
+    )
+    getattr(instance, "setInteger" if flavour.fmi == 2 else "setInt32")(count, [1])
+    instance.setReal(x + y, [0.0, 0.0])
+    start(instance)
+    instance.doStep(0.0, 0.5)
+    assert list(instance.getBoolean(arrived * 2)) == [True, True]
+
+
 def test_what_the_model_works_out_is_refused_by_name_and_value(
     instance: Any, messages: list[str], flavour: Flavour, model: Model
 ) -> None:
