@@ -162,6 +162,12 @@ def complete(built: Built) -> Callable[[Flavour], Path]:
 
 
 @pytest.fixture(scope="session")
+def here(built: Built) -> Callable[[Flavour], Path]:
+    """A native FMU of any model, for this machine alone."""
+    return lambda flavour: _compiled(flavour, f"{flavour.identifier}.fmu", built, HERE[sys.platform])
+
+
+@pytest.fixture(scope="session")
 def complete_native_fmu(standard: int, complete: Callable[[Flavour], Path]) -> Path:
     """The native FMU of FMI 2.0, then that of FMI 3.0, for every platform."""
     return complete(NATIVE if standard == 2 else NATIVE3)
@@ -174,22 +180,21 @@ def autopilot(built: Built) -> Path:
 
 
 @pytest.fixture(scope="session")
-def native_autopilot(built: Built) -> Path:
+def native_autopilot(here: Callable[[Flavour], Path]) -> Path:
     """The native one, FMI 2.0, for this machine alone."""
-    return _compiled(AUTOPILOT_NATIVE, "AutopilotNative.fmu", built, HERE[sys.platform])
+    return here(AUTOPILOT_NATIVE)
 
 
 @pytest.fixture(scope="session")
-def native3_autopilot(built: Built) -> Path:
+def native3_autopilot(here: Callable[[Flavour], Path]) -> Path:
     """And of FMI 3.0."""
-    return _compiled(AUTOPILOT_NATIVE3, "AutopilotNative3.fmu", built, HERE[sys.platform])
+    return here(AUTOPILOT_NATIVE3)
 
 
 @pytest.fixture(scope="session")
-def each_native_tether(standard: int, built: Built) -> Path:
+def each_native_tether(standard: int, here: Callable[[Flavour], Path]) -> Path:
     """The native tether of FMI 2.0, then that of FMI 3.0, for this machine alone."""
-    flavour = TETHER_NATIVE if standard == 2 else TETHER_NATIVE3
-    return _compiled(flavour, f"{flavour.identifier}.fmu", built, HERE[sys.platform])
+    return here(TETHER_NATIVE if standard == 2 else TETHER_NATIVE3)
 
 
 @pytest.fixture(scope="session")

@@ -31,8 +31,8 @@ def model(flavour: Flavour) -> Model:
 
 
 @pytest.fixture(scope="module")
-def shared(flavour: Flavour, complete: Callable[[Flavour], Path]) -> Iterator[tuple[Any, list[str]]]:
-    with one(complete(flavour)) as made:
+def shared(flavour: Flavour, here: Callable[[Flavour], Path]) -> Iterator[tuple[Any, list[str]]]:
+    with one(here(flavour)) as made:
         yield made
 
 
