@@ -503,7 +503,8 @@ def judge(tree: Path, mutants: Iterator[Mutant], known: Known, record: Record) -
             while verdict and verdict.by in items and not is_sound(verdict.by):
                 del known.costs[verdict.by]
                 verdict = judged(tree, mutant, known, compiled, run)
-            if verdict and not mutant.file.endswith(".py") and (verdict.verdict, verdict.by) == (SURVIVED, ""):
+            is_c = not mutant.file.endswith(".py")
+            if verdict and verdict.verdict == SURVIVED and not verdict.by and is_c and not known.only:
                 print(SANITIZED, file=told, flush=True)
                 verdict = _sanitized(tree, mutant, verdict)
             if verdict:
