@@ -632,7 +632,7 @@ def _collected(tree: Path, files: list[str], order: list[str], known: Known, tol
 
 
 def _alone(test: str, tree: Path) -> int:
-    """What pytest returns of a test that compiles for itself."""
+    """What pytest returns of a test that compiles for itself; 1 where it does not end, too."""
     import resource
 
     place = str(tree / "alone")
@@ -641,6 +641,8 @@ def _alone(test: str, tree: Path) -> int:
     resource.setrlimit(resource.RLIMIT_AS, (limit[1], limit[1]))  # sanitizers ask for terabytes that they do not use
     try:
         return subprocess.run(command, cwd=tree, capture_output=True, check=False, timeout=TIME_LIMIT).returncode
+    except subprocess.TimeoutExpired:
+        return 1
     finally:
         resource.setrlimit(resource.RLIMIT_AS, limit)
 
