@@ -80,15 +80,16 @@ def seeds(folder: Path) -> Path:
 
 
 def calls(seconds: int) -> str:
-    """Of both standards; what libFuzzer says of each."""
+    """Of both standards and every model. Raises AssertionError, as `fuzz` does."""
     if missing():
         sys.exit(missing())
-    said = []
+    sequences = 0
     for each in NATIVE_FLAVOURS:
         with tempfile.TemporaryDirectory() as place:
             program = compiled(written_sources(Path(place), each), each, LONG)
-            said.append(fuzz(program, f"-max_total_time={seconds}"))
-    return "\n".join(said)
+            report = fuzz(program, f"-max_total_time={seconds}")
+            sequences += int(report.split("number_of_executed_units: ")[1].split()[0])
+    return f"{sequences:,} sequences on {len(NATIVE_FLAVOURS)} FMUs: nothing"
 
 
 def valgrind(sequences: int) -> str:
