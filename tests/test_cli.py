@@ -445,7 +445,14 @@ def test_what_is_full_is_named(shell: Shell) -> None:
     (shell.folder / "full.csv").symlink_to("/dev/full")
     refused = shell.refused("simulate", "--stop-time", "1", "--output", "full.csv")
     assert refused == "hovercraft-fmu: full.csv: No space left on device\n"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full: not on this system")
+@pytest.mark.parametrize("what", ["--help", "--version", "simulate --help", "simulate --list-scenes"])
+def test_standard_output_that_is_full_is_named(what: str) -> None:
+    """With Python's buffer, which has it until the end."""
+    env = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "hovercraft_fmu", "simulate", "--list-scenes"]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+        command = [sys.executable, "-m", "hovercraft_fmu", *what.split()]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, env=env)
     assert (done.returncode, done.stderr) == (1, "hovercraft-fmu: standard output: No space left on device\n")

@@ -14,7 +14,7 @@ from .. import stopping
 from .._version import __version__
 from . import demos, files, many, running
 from .helping import HelpContext, write_rows
-from .output import OUTPUT, QUIET_OPTION, VERBOSE_OPTION, VOICE, one_line
+from .output import OUTPUT, QUIET_OPTION, VERBOSE_OPTION, VOICE, let_go_of_output, one_line
 
 __all__ = ["OUTPUT", "commands", "main"]
 
@@ -49,6 +49,7 @@ def main(arguments: list[str] | None = None) -> None:
 def _fail(error: Exception) -> NoReturn:
     if VOICE.is_verbose:
         traceback.print_exception(error)
+    error = let_go_of_output(error)
     for line in getattr(error, "mistakes", (one_line(error),)):
         _say(line)
     sys.exit(1)

@@ -33,6 +33,21 @@ def _to_standard_output() -> Iterator[None]:
         raise OSError(error.errno, error.strerror, "standard output") from error
 
 
+def let_go_of_output(error: Exception) -> Exception:
+    """Where standard output is full Python would try again as it ends, say so in its way, and end with 120.
+
+    Returns:
+        The error, which then names it.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError as full:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, OSError) and not error.filename:
+            return OSError(full.errno, full.strerror, "standard output")
+    return error
+
+
 class StandardOutput(Console):
     """Raises OSError, which names it, where it is full."""
 
